@@ -6,6 +6,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.test_accessibility import violations
 from tests.support.browser.finger import Touch
 from tests.support.browser.pages import DRAWN, HIDE, place, widget
 from tests.support.parts import Server, until
@@ -171,3 +172,23 @@ def test_arrow_keys_go_through_the_list_and_enter_chooses(shuttle: Server, page:
     card(page).locator(".unchoose").focus()
     page.keyboard.press("Enter")
     expect(widget(page, "goal").locator('[data-place="dock"]')).to_be_focused()
+
+
+def test_axe_finds_nothing_in_the_list_and_on_the_card(shuttle: Server, axe_page: Page) -> None:
+    opened(axe_page, shuttle)
+    assert violations(axe_page) == []
+    widget(axe_page, "goal").locator('[data-place="dock"]').click()
+    expect(card(axe_page)).to_be_visible()
+    assert violations(axe_page) == []
+
+
+def test_a_phone_shows_the_map_and_the_places_and_chooses_nothing(
+    shuttle: Server, touchscreen: Page
+) -> None:
+    touchscreen.set_viewport_size({"width": 390, "height": 844})
+    page = opened(touchscreen, shuttle)
+    expect(widget(page, "goal").locator('[data-place="dock"]')).to_be_visible()
+    touch_and_drag(page)
+    page.evaluate(DRAWN)
+    assert chosen(page) == ""
+    expect(widget(page, "drive")).to_be_hidden()

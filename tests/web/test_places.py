@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import pytest
 
-from tests.support.parts import Server, until
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import demo_server
 from tests.web.test_map import SILENT
 
@@ -184,3 +184,32 @@ def test_a_robot_that_is_not_heard_locks_the_buttons(tmp_path_factory: pytest.Te
             status, outcome, reason = press(server, value)
             assert (status, outcome) == (409, "refused")
             assert "not known where the robot is" in reason
+
+
+NAVIGATE: Final = """
+[[page.widget]]
+id = "navigate"
+kind = "action"
+label = "Send"
+action = "/navigate_to_pose"
+type = "nav2_msgs/action/NavigateToPose"
+goal = { pose = { header = { frame_id = "{goal.frame}", stamp = "{now}" }, pose = "{goal.pose}" } }
+[demo."/navigate_to_pose"]
+duration_s = 60.0
+"""
+
+
+def test_a_goal_of_an_action_is_named_and_can_be_canceled(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    interfaces = ROOT / "docs/examples/mobile-robot/interfaces"
+    panel = PANEL.replace('title = "Shuttle"', f'title = "Shuttle"\ninterfaces = ["{interfaces}"]')
+    with demo_server(tmp_path_factory.mktemp("nav"), panel + NAVIGATE) as server:
+        until(lambda: server.widget("navigate")["enabled"], "it is permitted")
+        status, outcome, reason = press(server, "pit", "navigate")
+        assert (status, outcome) == (409, "refused")
+        status, outcome, reason = press(server, "dock", "navigate")
+        assert (status, outcome, reason.partition(":")[0]) == (200, "accepted", "Dock")
+        until(lambda: server.widget("navigate")["stoppable"], "it is under way")
+        server.http.post("/widgets/navigate/cancel", json={})
+        until(lambda: server.widget("navigate")["outcome"] == "canceled", "it is canceled")

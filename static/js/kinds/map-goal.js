@@ -9,6 +9,7 @@ const NEAR_PX = 26; // around a symbol that a finger meets
 const TURN_PX = 22; // a drag that is shorter does not turn
 const RING_PX = 17;
 const ARROW_PX = 46;
+const PHONE = matchMedia("(max-width: 599px)"); // it only shows
 const SVG = "http://www.w3.org/2000/svg";
 
 /** @param {string} tag @param {Record<string, string | number>} attributes @param {Element[]} children */
@@ -79,7 +80,7 @@ export class Places {
   /** @param {PointerEvent} event */
   #met(event) {
     const point = this.#view.pointAt(event);
-    if (!point) return null;
+    if (!point || PHONE.matches) return null;
     const here = this.#view.at(point.x, point.y);
     const met = this.#places
       .filter(({ reason }) => !reason)
@@ -130,7 +131,7 @@ export class Goal {
   onTouch(chosen) {
     this.#map.dataset.goals = "";
     this.#view.onPointer((event) => {
-      const start = event.button === 0 ? this.#view.pointAt(event) : null;
+      const start = event.button === 0 && !PHONE.matches ? this.#view.pointAt(event) : null;
       if (!start) return null;
       const { version } = this.#view;
       const direction = (/** @type {PointerEvent} */ moved) => this.#direction(start, moved);
