@@ -24,7 +24,7 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.inputs import SelectInput
-from app.panel.widgets.map_layers import GRID_TYPE
+from app.panel.widgets.map_layers import GRID_TYPE, updates_of
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import (
     EVENT_TYPE,
@@ -307,6 +307,11 @@ class Panel(PanelKeys):
         """The topics of the maps that the panel shows, and of costmaps over them."""
         grids = (topic for view in self.map_views.values() for topic in view.grids)
         return tuple(dict.fromkeys(grids))
+
+    @property
+    def map_updates(self) -> tuple[str, ...]:
+        """The topics of the updates of `maps`."""
+        return tuple(updates_of(topic).topic for topic in self.maps)
 
     @cached_property
     def map_views(self) -> dict[str, MapView]:

@@ -556,9 +556,10 @@ class Recorder:
             "after_s": f"{rules.after_s:g}",
         }
         types = panel.subscriptions()
+        usual = {*types} - {*panel.maps, *panel.map_updates}
         self._channels = {
             key: Channel(f"/{key}", types[topic], interfaces.definition(types[topic]))
-            for topic in ({*types} - {*panel.maps} if rules.topics is None else rules.topics)
+            for topic in (usual if rules.topics is None else rules.topics)
             for key in robot.possible_keys(topic)
         }
         self._ring = RingBuffer(max(rules.before_s, LAST_S), recordings.ring_bytes)

@@ -450,3 +450,18 @@ def test_panel_file_selects_the_recorded_topics(tmp_path: Path) -> None:
     path.write_text(shipped.replace("[[interlock]]", "[record]\n[[interlock]]", 1))
     assert load_panel(path).record == RecordRules()
     assert load_panel(ROOT / "app/panel.toml").record is None
+
+
+def test_maps_and_their_updates_are_recorded_only_where_they_are_named(tmp_path: Path) -> None:
+    layers = [{"shows": "costmap", "topic": "/costmap"}, {"shows": "scan", "topic": "/scan"}]
+    panel = panel_of({"id": "hall", "kind": "map", "label": "Hall", "layer": layers})
+    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK)
+
+    async def recorded(rules: RecordRules) -> set[str]:
+        recordings = Recordings(tmp_path, 16.0, 1)
+        return {*Recorder(panel, rules, INTERFACES, robot, "", recordings).keys}
+
+    usual = asyncio.run(recorded(RecordRules()))
+    assert usual - {"operation_enabled"} == {"tf", "tf_static", "scan"}
+    named = RecordRules(topics=("/map_updates",))
+    assert asyncio.run(recorded(named)) == {"map_updates"}
