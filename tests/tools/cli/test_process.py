@@ -33,6 +33,18 @@ def test_forked_command_has_the_given_folder_and_environment(start: Start, tmp_p
     assert done.stdout.startswith(f'{tmp_path}/cell1.toml: good: "Robot cell 1"')
 
 
+def test_run_starts_a_shipped_panel_by_its_name(start: Start, tmp_path: Path) -> None:
+    env = {"KIOSK_DATA": str(tmp_path)}
+    words = ("run", "mobile-robot", "--port", str(free_port()))
+    process = start(COMMAND, *words, folder=tmp_path, env=env)
+    assert process.stderr is not None
+    lines = iter(process.stderr.readline, "")
+    assert any('panel "Shuttle 1"' in line and "robot simulated" in line for line in lines)
+    assert any("the panel is at http://127.0.0.1:" in line for line in lines)
+    process.send_signal(signal.SIGINT)
+    assert command.finished(process).returncode in (0, 128 + signal.SIGINT)
+
+
 def test_a_mistake_is_one_sentence_and_status_2(start: Start) -> None:
     done = command.finished(start(COMMAND, "topics", "--conect", "tcp/127.0.0.1:1"))
     assert (done.returncode, done.stdout) == (2, "")
