@@ -11,7 +11,7 @@ from app.cell.robot.maps import COLOURS, FREE_COLOUR, OCCUPIED_COLOUR, Grid
 from app.panel.places import Zone
 
 Floor = Literal["outside", "occupied", "unknown", "free"]
-MAX_ROWS: Final = 4_000  # of cells that are looked at: a map's cells may be tiny
+MAX_ROWS: Final = 400  # of cells that are looked at: a millisecond, however small the cells
 MAX_KEPT: Final = 2_000  # floors of one map
 
 
