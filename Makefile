@@ -142,9 +142,8 @@ browser:
 	$(if $(ARGS),INSTALL=no )sh tests/system.sh browser
 
 bridge: system
-	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge of the tests: once, 5 to 10 minutes"
-	cargo build --release --locked --manifest-path tests/bridge_crate/Cargo.toml --target-dir $(CACHE)/bridge
-	cargo build --release --locked --manifest-path tests/rmw_crate/Cargo.toml --target-dir $(CACHE)/bridge
+	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge and a node on hiroz for the tests: once, 5 to 10 minutes"
+	cargo build --release --locked --workspace --manifest-path tests/Cargo.toml --target-dir $(CACHE)/bridge
 
 NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "the panel needs Python 3.11 or later, and this is %d.%d: make $(MAKECMDGOALS) PYTHON=python3.11" % sys.version_info[:2])'
 

@@ -4,7 +4,7 @@
 # `system.sh PACKAGE` looks for that one alone. With INSTALL=no the packages are named only.
 set -eu
 FONTS=/usr/share/fonts/truetype
-RUST=1.89 # of what tests/bridge_crate/Cargo.lock has
+RUST=1.89 # of what tests/Cargo.lock has
 only=${1:-}
 
 missing=""

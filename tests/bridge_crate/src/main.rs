@@ -19,6 +19,8 @@ fn configured(mut args: impl Iterator<Item = String>) -> Result<zenoh::Config, F
         ("plugins_loading/enabled", "true"),
         ("timestamping/enabled", "true"),
         ("adminspace/enabled", "true"),
+        // The stand-alone bridge is built without it; hiroz, built beside this one, needs it.
+        ("transport/shared_memory/enabled", "false"),
     ] {
         config.insert_json5(place, value)?;
     }
