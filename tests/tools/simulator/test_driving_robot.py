@@ -13,7 +13,8 @@ from app.panel import load_panel
 from app.panel.demo import DRIVING
 from app.panel.widgets.map_layers import UPDATE_TYPE
 from app.system.settings import panel_path
-from app.tools.simulator.driving import (
+from app.tools.simulator.hall import COLUMNS, ROWS
+from app.tools.simulator.mobile_robot import (
     FOLLOW_NO_PROGRESS,
     GOAL_OCCUPIED,
     PLACES,
@@ -21,7 +22,6 @@ from app.tools.simulator.driving import (
     MobileRobot,
     Pose,
 )
-from app.tools.simulator.hall import COLUMNS, ROWS
 from app.tools.simulator.robot import CANCEL_OK, CANCEL_TOO_LATE, CANCEL_UNKNOWN, CANCELED, SUCCEEDED
 from tests.support.stepped import Stepped
 

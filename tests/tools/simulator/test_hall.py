@@ -6,8 +6,8 @@ from typing import Final
 
 import pytest
 
-from app.tools.simulator.driving import PLACES, RADIUS, START
 from app.tools.simulator.hall import COARSE, COLUMNS, FREE, MACHINES, ROWS, STRIDE, cell_at, hall
+from app.tools.simulator.mobile_robot import PLACES, RADIUS, START
 
 INSIDE_A_MACHINE: Final = (-3.4, 9.0)
 

@@ -5,7 +5,7 @@ from typing import Final
 
 import pytest
 
-from app.tools.simulator.driving import (
+from app.tools.simulator.mobile_robot import (
     BLOCKED_EACH,
     DOCK,
     DOCK_NOT_IN_DB,
