@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.system.settings import panel_path
-from tests.support.browser.pages import widget
+from tests.support.browser.pages import place, widget
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 
@@ -59,6 +59,7 @@ def test_robot_drives_to_a_place_that_is_chosen_and_the_receipt_says_so(
     state(page, "WAITING")
 
 
+@pytest.mark.long("real time")
 def test_blocked_way_is_an_alarm_and_the_goal_says_why_it_ends(shuttle: Server, page: Page) -> None:
     put_box(page, shuttle, "on")
     opened(page, shuttle)
@@ -76,3 +77,20 @@ def test_cancel_ends_the_goal_and_the_robot_stands(shuttle: Server, page: Page) 
     widget(page, "send").locator(".cancel").click()
     expect(widget(page, "send")).to_contain_text("Canceled at")
     state(page, "WAITING")
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 600), (800, 480)], ids=str)
+def test_card_of_a_place_is_wholly_seen(shuttle: Server, page: Page, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    opened(page, shuttle)
+    if size[0] == 800:
+        page.get_by_text("Places", exact=True).first.click()
+    goal = widget(page, "goal")
+    goal.locator("[data-place=wrapper]").click()
+    expect(goal.locator(".place-card dd").first).to_be_visible()
+    parts = ("h3", "dd >> nth=-1", ".unchoose")
+    card, *boxes = (
+        place(goal.locator(part)) for part in (".place-card", *(f".place-card {p}" for p in parts))
+    )
+    bottom = card["y"] + card["height"]
+    assert [box["height"] >= 18 and box["y"] + box["height"] <= bottom for box in boxes] == [True] * 3
