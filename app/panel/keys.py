@@ -26,7 +26,7 @@ from app.panel.condition import Interlock, NamedCondition
 from app.panel.demo import DemoEntry, StoryName
 from app.panel.file.wording import one_of
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
-from app.panel.places import Places, Zones
+from app.panel.places import Places, ZoneFiles, Zones
 from app.panel.recipe import RecipeSet
 from app.panel.robot_texts import RobotText
 from app.panel.rules import (
@@ -207,6 +207,7 @@ class PanelKeys(Description):
     )
     places: Places = Field((), alias="place")
     zones: Zones = Field((), alias="zone")
+    zone_files: ZoneFiles = Field((), alias="zone_file")
     recipes: Annotated[tuple[RecipeSet, ...], Field(strict=False)] = Field((), alias="recipe")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Not of the file: its revision (other pages are out of date), the places of `same` widgets and, in

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from app.panel.alarm import Alarm, inhibited_name
-from app.panel.base import TopicQos
+from app.panel.base import FileContext, TopicQos
 from app.panel.condition import Condition, Interlock, NamedCondition
+from app.panel.geojson import FileZones, read_zones
 from app.panel.keys import SUMS, PanelKeys
 from app.panel.keys import RobotEntry as RobotEntry
 from app.panel.layout import FRAMES, Page
@@ -317,6 +318,22 @@ class Panel(PanelKeys):
     def map_views(self) -> dict[str, MapView]:
         """The maps by their ids."""
         return {str(w.id): w for w in self.widgets() if isinstance(w, MapView)}
+
+    @cached_property
+    def zones_of_files(self) -> tuple[FileZones, ...]:
+        """The zones of each GeoJSON file of zones."""
+        read = []
+        for table in self.zone_files:
+            context = FileContext(table.file.parent, self.language)
+            beside = {"map_version": table.map_version, "robot": table.robot}
+            read.append(read_zones(table.file, context, beside))
+        return tuple(read)
+
+    @cached_property
+    def geojson_files(self) -> tuple[Path, ...]:
+        """The files of zones and route graphs, each once."""
+        graphs = (view.routes.file for view in self.map_views.values() if view.routes)
+        return tuple(dict.fromkeys((*(table.file for table in self.zone_files), *graphs)))
 
     @property
     def map_shapes(self) -> dict[str, str]:

@@ -3,11 +3,12 @@
 Metres and radians, as in ROS (REP 103): x to the east and y to the north of the map, yaw from x to y.
 """
 
+from functools import cached_property
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from app.panel.base import FiniteNumber, Icon, Id, Label
+from app.panel.base import File, FiniteNumber, Icon, Id, Label
 from app.panel.shared_keys import RobotKey
 from app.ros.messages.validation import format_value
 
@@ -15,6 +16,8 @@ FULL_TURN: Final = 6.2832  # radians
 MAX_PLACES: Final = 500
 MAX_ZONES: Final = 200
 MAX_CORNERS: Final = 200
+MAX_HOLES: Final = 20
+MAX_FILES: Final = 20
 LEAST_CORNERS: Final = 3
 FAR_M: Final = 1e6
 PAIR: Final = 2
@@ -74,16 +77,40 @@ class Place(RobotKey):
 
 
 class Zone(RobotKey):
-    """An area of the map, by its corners in metres in the map's frame. No goal may be in a `keep_out`
-    zone; the others are only shown. `yaw` is where a `one_way` zone leads, in radians."""
+    """An area of the map, by its corners in metres in the map's frame; `holes` are not of it. No goal
+    may be in a `keep_out` zone; the others are only shown. `yaw` is where a `one_way` zone leads, in
+    radians."""
 
     id: Id
     label: Label
     kind: ZoneKind
     points: Corners
+    holes: Annotated[tuple[Corners, ...], Field(strict=False, max_length=MAX_HOLES)] = ()
     yaw: Yaw | None = None
+    map_version: MapVersion | None = None
+
+    @cached_property
+    def rings(self) -> tuple[Corners, ...]:
+        """Its outline, then its holes."""
+        return (self.points, *self.holes)
+
+    @property
+    def yaw_fault(self) -> str:
+        """What is wrong with `yaw`, "" if nothing is."""
+        if self.kind == "one_way" and self.yaw is None:
+            return "is missing: where the zone leads, in radians"
+        if self.kind != "one_way" and self.yaw is not None:
+            return f'is of a zone of the kind "one_way"; this is {self.kind}'
+        return ""
+
+
+class ZoneFile(RobotKey):
+    """A GeoJSON file with zones of the map, in metres in the map's frame."""
+
+    file: File
     map_version: MapVersion | None = None
 
 
 Places = Annotated[tuple[Place, ...], Field(strict=False, max_length=MAX_PLACES)]
 Zones = Annotated[tuple[Zone, ...], Field(strict=False, max_length=MAX_ZONES)]
+ZoneFiles = Annotated[tuple[ZoneFile, ...], Field(strict=False, max_length=MAX_FILES)]

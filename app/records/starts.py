@@ -148,7 +148,7 @@ HIDDEN: Final = "…"
 # program is in its wheel: of the one only the hash is, of the other the list of hashes. Fonts are
 # large, and say nothing of what the panel does: only their hashes are kept.
 PANEL: Final = "panel"
-FILE_GROUPS: Final = (PANEL, "templates", "styles", "definitions", "catalogues", "pictures")
+FILE_GROUPS: Final = (PANEL, "templates", "styles", "definitions", "catalogues", "pictures", "maps")
 GROUPS: Final = (*FILE_GROUPS, "fonts", "zenoh", "program")
 
 
@@ -264,7 +264,11 @@ def _paths(settings: Settings, panel: "Panel") -> Iterator[tuple[str, str, Path]
     them."""
     beside = settings.panel.parent
     yield PANEL, settings.panel.name, settings.panel
-    for group, own in (("templates", panel.templates), ("styles", panel.styles)):
+    for group, own in (
+        ("templates", panel.templates),
+        ("styles", panel.styles),
+        ("maps", panel.geojson_files),
+    ):
         yield from ((group, _name(path, beside), path) for path in own)
     for folder in panel.interfaces:
         paths = sorted(path for path in Path(folder).rglob("*") if DEFINITIONS.fullmatch(path.name))
@@ -306,7 +310,7 @@ ARROW: Final = "→"
 ABSENT: Final = "–"
 MORE: Final = "… more"
 # The groups of files whose changes are named by file; the program's are many, and its list is one.
-BY_FILE: Final = ("templates", "styles", "definitions", "catalogues", "pictures", "fonts")
+BY_FILE: Final = ("templates", "styles", "definitions", "catalogues", "pictures", "maps", "fonts")
 
 
 def flat(tables: Mapping[str, Any]) -> dict[str, str]:

@@ -31,6 +31,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/widgets/{widget}/lines": ANYBODY,
     "/widgets/{widget}/lock": ANYBODY,
     "/widgets/{widget}/map.png": ANYBODY,
+    "/widgets/{widget}/map/routes/{version}.json": ANYBODY,
     "/widgets/{widget}/map/{version}/{column}-{row}.png": ANYBODY,
     "/widgets/{widget}/place": ANYBODY,
     "/widgets/{widget}/trend": ANYBODY,

@@ -68,6 +68,8 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "list.level": ("field path", ""),
     "list.active": ("field path", ""),
     "catalogue": ("file", ""),
+    "zone_file.file": ("file", ""),
+    "routes.file": ("file", ""),
     "inhibits": ("id of a control", ""),
     "robot": ("id of a robot", ""),
     "panel.robot": ("", ""),

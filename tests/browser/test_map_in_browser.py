@@ -13,6 +13,7 @@ from tests.support.browser.pages import DRAWN, HIDE, middle, place, widget
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_map import PANEL, SILENT
+from tests.web.test_map_files import put_files
 
 pytestmark = pytest.mark.promise("values")
 
@@ -273,3 +274,43 @@ def test_the_list_of_layers_is_used_by_keys(layered: Server, page: Page) -> None
     page.keyboard.press("Escape")
     expect(opener).to_be_focused()
     expect(scan).to_be_hidden()
+
+
+# Where the plan's lower left corner is, and the map's point (-2, -1), in pixels of the view.
+PLAN_AT: Final = """async (root) => {
+  const scripts = performance.getEntriesByType("resource");
+  const { name } = scripts.find(({ name }) => name.endsWith("/kinds/map.js"));
+  const { x, y } = (await import(name)).viewOf(root).at(-2, -1);
+  const view = root.querySelector(".map-view").getBoundingClientRect();
+  const plan = root.querySelector(".map-plan img");
+  const box = plan.getBoundingClientRect();
+  return { x, y, left: box.left - view.left, bottom: box.bottom - view.top, width: plan.naturalWidth };
+}"""
+
+
+def test_routes_and_a_plan_of_files_are_in_their_place_and_can_be_hidden(
+    tmp_path: Path, touchscreen: Page
+) -> None:
+    panel = put_files(tmp_path).replace("-1.0, 0.5]", "-1.0, 0.0]")
+    with demo_server(tmp_path, panel) as server:
+        page = opened(touchscreen, server)
+        routes, plan = page.locator(".map-routes"), page.locator(".map-plan")
+        edges = routes.locator("path").first
+        expect(edges).to_have_attribute("d", re.compile(r"M-200 -120L125 50M125 50L125 -100M.+L.+L"))
+        expect(routes.locator("[data-nodes]")).to_have_attribute("d", re.compile("(M[^M]+){3}$"))
+        until(lambda: widget(page, "hall").evaluate(PLAN_AT)["width"] == 40, "the plan is loaded")
+        page.evaluate(DRAWN)
+        at = widget(page, "hall").evaluate(PLAN_AT)
+        assert (at["left"], at["bottom"]) == (
+            pytest.approx(at["x"], abs=2),
+            pytest.approx(at["y"], abs=2),
+        )
+        key(page, "Layers")
+        for name, mark in (("Routes", routes), ("Plan", plan)):
+            key(page, name)
+            expect(mark).to_be_hidden()
+        page.reload()
+        expect(widget(page, "hall")).to_have_attribute("data-version", VERSION)
+        expect(edges).to_have_attribute("d", re.compile("M-200"))
+        expect(routes).to_be_hidden()
+        expect(plan).to_be_hidden()

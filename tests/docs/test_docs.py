@@ -15,7 +15,7 @@ from app.system.settings import PREFIX, VARIABLES
 from app.web.routes.holds import END_REASONS, Beat, Begin, End, HoldMessage
 from app.web.server import OPTIONS
 from bench.report.tables import BEGIN, END
-from tests.support.beside_panel import put_named_fonts
+from tests.support.beside_panel import put_named_files
 from tests.support.parts import ROOT, Server, as_response, until
 from tests.support.processes import command
 from tests.support.servers import ready
@@ -124,7 +124,7 @@ def test_each_example_of_a_panel_is_good(example: str, tmp_path: Path) -> None:
     messages = tmp_path / "cell_msgs/msg"
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text(JOG)
-    put_named_fonts(tmp_path, example)
+    put_named_files(tmp_path, example)
     panel = tmp_path / "cell1.toml"
     panel.write_text(completed(example))
     assert load_panel(panel).pages

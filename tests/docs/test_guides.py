@@ -10,7 +10,7 @@ import pytest
 
 from app.panel import load_panel
 from tests.docs.test_palletizing import PANELS as QUOTED_PANELS
-from tests.support.beside_panel import put_named_fonts
+from tests.support.beside_panel import put_named_files
 from tests.support.parts import ROOT, Server
 from tests.support.processes import command
 
@@ -49,7 +49,7 @@ def kinds(folder: Path, *blocks: str) -> set[str]:
     """The kinds of widgets of a panel that these blocks are."""
     whole = "\n".join(blocks)
     assert OWN in whole
-    put_named_fonts(folder, whole)
+    put_named_files(folder, whole)
     panel = folder / "cell1.toml"
     panel.write_text(whole.replace(OWN, OWN.removeprefix("# ")))
     return {widget.kind for widget in load_panel(panel).widgets()}

@@ -105,6 +105,7 @@ CAMERAS: Final = (
 MAP: Final[Table] = {"label": texts.HALL.table}
 NOWHERE: Final = {"grid": None, "pose": None, "about": "", "detail": "", "layer_note": ""}
 LAYER: Final = {"shows": "scan", "topic": "/scan"}
+MAP_PLAN: Final = {"src": "box.svg", "resolution": 1.0}
 NO_WAY: Final = say("transform_unknown", base="laser", fixed="map", name="laser")
 NO_SCAN: Final = {"label": say("map_layer_scan"), "state": "unplaced", "note": NO_WAY}
 MAPS: Final = (
@@ -113,7 +114,7 @@ MAPS: Final = (
     Example(
         "a layer without a place",
         "map",
-        MAP | {"layer": [LAYER]},
+        MAP | {"layer": [LAYER], "plan": MAP_PLAN},
         {"state": "live", "note": ""}
         | NOWHERE
         | {"layer_0": NO_SCAN}

@@ -105,7 +105,7 @@ def test_the_list_has_each_place_with_its_distance_or_why_it_is_locked(shuttle: 
 
 def test_the_map_has_the_zones(shuttle: Server) -> None:
     (zone,) = shuttle.widget("hall")["zones"]
-    assert (zone["label"], zone["kind"], zone["points"][0]) == ("Stairs", "keep_out", [-2.5, -1.7])
+    assert (zone["label"], zone["kind"], zone["rings"][0][0]) == ("Stairs", "keep_out", [-2.5, -1.7])
 
 
 def test_the_card_says_what_a_press_would_send(shuttle: Server) -> None:

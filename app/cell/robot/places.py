@@ -61,9 +61,13 @@ def keep_out_at(zones: Iterable[Zone], version: str, x: float, y: float, radius:
     for zone in zones:
         if zone.kind != "keep_out" or zone.map_version not in (None, version):
             continue
-        if _contains(zone.points, x, y) or _distance(zone.points, x, y) < radius:
+        if _is_in(zone, x, y) or any(_distance(ring, x, y) < radius for ring in zone.rings):
             return zone
     return None
+
+
+def _is_in(zone: Zone, x: float, y: float) -> bool:
+    return _contains(zone.points, x, y) and not any(_contains(hole, x, y) for hole in zone.holes)
 
 
 def _contains(points: Sequence[tuple[float, float]], x: float, y: float) -> bool:

@@ -21,8 +21,8 @@ def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, 
     """Attributes: `state` (live, old, waiting, unreadable), `note`, `grid` (the map's geometry and
     version; None without one), `pose` ([x, y, yaw] in metres and radians in the map's frame, None if
     unknown), `zones`, `about`, the time of the map and how precise the pose is, `detail`, `layer_0` and
-    so on, and `layer_note`, what is wrong with the first layer that is not drawn; and when they
-    change."""
+    so on, and `layer_note`, what is wrong with the first layer that is not drawn, `routes` if the panel
+    file has a route graph; and when they change."""
     state = robot.maps[robot.key(widget.topic)]
     if mismatch := topic_mismatch("MS", widget, robot):
         return _without_map(widget, "unreadable", mismatch.reason or ""), math.inf
@@ -36,7 +36,9 @@ def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, 
     if not robot.link_up or not robot.graph.peers:
         note = say("map_no_connection") if shown.pose is None else note or say("map_no_connection")
     layers = [map_layer(widget, layer, robot, geometry, now) for layer in widget.layers]
+    routes = _routes(widget, geometry.frame)
     warnings = [layer.attributes["warning"] for layer in layers]
+    warnings += [each["note"] for each in routes.values()]
     ellipses = [layer.attributes["ellipse"] for layer in layers if "ellipse" in layer.attributes]
     return {
         "state": "old" if note else "live",
@@ -50,6 +52,7 @@ def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, 
         "detail": _detail(geometry),
         "layer_note": next(filter(None, warnings), ""),
         **{f"layer_{number}": dict(layer.attributes) for number, layer in enumerate(layers)},
+        **routes,
     }, min([shown.until, *(layer.until for layer in layers)])
 
 
@@ -62,9 +65,24 @@ def _about(wall: float, ellipses: list[list[float]]) -> TextLike:
     return say("map_about_within", time=format_time(wall), within=within)
 
 
+def _routes(widget: MapView, frame: str) -> dict[str, Any]:
+    """The version of the route graph, "" while it is not drawn, and why: it is in another frame, or
+    there is no map (`frame` is "")."""
+    if widget.routes is None:
+        return {}
+    graph = widget.routes.graph
+    if not frame:
+        return {"routes": {"version": "", "note": ""}}
+    if graph.frame not in ("", frame):
+        note = say("map_routes_frame", frame=graph.frame, map=frame)
+        return {"routes": {"version": "", "note": note}}
+    return {"routes": {"version": graph.version, "note": ""}}
+
+
 def _zone(zone: Zone) -> dict[str, Any]:
-    """An area for the page: its corners in metres, and where a one-way zone leads, in radians."""
-    return {"label": zone.label, "kind": zone.kind, "points": zone.points, "yaw": zone.yaw}
+    """An area for the page: its outline and its holes, by corners in metres, and where a one-way zone
+    leads, in radians."""
+    return {"label": zone.label, "kind": zone.kind, "rings": zone.rings, "yaw": zone.yaw}
 
 
 def _detail(geometry: Geometry) -> TextLike:
@@ -85,4 +103,5 @@ def _without_map(widget: MapView, state: str, note: TextLike) -> dict[str, Any]:
         "detail": "",
         "layer_note": "",
         **{f"layer_{number}": no_layer(layer) for number, layer in enumerate(widget.layers)},
+        **_routes(widget, ""),
     }

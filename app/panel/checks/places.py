@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from app.panel.file.wording import no_such
 from app.panel.model import Panel
+from app.panel.places import MAX_ZONES
 from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
 from app.panel.widgets.families import BaseWidget, Command, PressCommand
@@ -20,10 +21,9 @@ def place_faults(panel: Panel) -> Iterator[Fault]:
             message = f'"{place.label}" is already the label of place[{first}]'
             yield Fault(f"place[{p}].label", message)
     for z, zone in enumerate(panel.zones):
-        if zone.kind == "one_way" and zone.yaw is None:
-            yield Fault(f"zone[{z}].yaw", "is missing: where the zone leads, in radians")
-        elif zone.kind != "one_way" and zone.yaw is not None:
-            yield Fault(f"zone[{z}].yaw", f'is of a zone of the kind "one_way"; this is {zone.kind}')
+        if zone.yaw_fault:
+            yield Fault(f"zone[{z}].yaw", zone.yaw_fault)
+    yield from _zone_file_faults(panel)
     for p, page in enumerate(panel.pages):
         for place_of, widget in page.placed():
             yield from _widget_faults(f"page[{p}].{place_of}", widget, panel)
@@ -33,6 +33,17 @@ def place_faults(panel: Panel) -> Iterator[Fault]:
             if name in chosen:
                 message = f'"{name}" is a place, of the moment: a recipe has other inputs'
                 yield Fault(f"recipe[{r}].fields[{f}]", message)
+
+
+def _zone_file_faults(panel: Panel) -> Iterator[Fault]:
+    number = len(panel.zones)
+    for z, read in enumerate(panel.zones_of_files):
+        yield from (Fault(f"zone_file[{z}].file", message) for message in read.faults)
+        number += len(read.zones)
+        if number > MAX_ZONES:
+            message = f"the panel has {number} zones with those of this file: {MAX_ZONES} at most"
+            yield Fault(f"zone_file[{z}].file", message)
+            return
 
 
 def _is_same(panel: Panel, first: int, second: int) -> bool:

@@ -138,6 +138,7 @@ def _named_robots(panel: Panel) -> Iterator[tuple[str, str | None]]:
     yield from ((f"condition[{c}]", each.robot) for c, each in enumerate(panel.own_conditions))
     yield from ((f"place[{p}]", place.robot) for p, place in enumerate(panel.places))
     yield from ((f"zone[{z}]", zone.robot) for z, zone in enumerate(panel.zones))
+    yield from ((f"zone_file[{z}]", each.robot) for z, each in enumerate(panel.zone_files))
     yield from ((f"alarm[{a}]", alarm.robot) for a, alarm in enumerate(panel.alarms))
     yield from ((f"frame.widget[{w}]", each.robot) for w, each in enumerate(panel.frame.widgets))
     for p, page in enumerate(panel.pages):

@@ -143,7 +143,8 @@ def _context(file: TomlFile) -> FileContext:
 
 
 def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
-    """The panel with values in place of constants' names in lamps and interlocks."""
+    """The panel with values in place of constants' names in lamps and interlocks, and with the zones of
+    files among its zones."""
 
     def resolved(widgets: Iterable[BaseWidget]) -> tuple[BaseWidget, ...]:
         return tuple(widget.with_constants(interfaces) for widget in widgets)
@@ -165,6 +166,7 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
         "alarms": alarms,
         "state": state,
         "frame": frame,
+        "zones": (*panel.zones, *(zone for read in panel.zones_of_files for zone in read.zones)),
     }
     return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
 

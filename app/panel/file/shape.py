@@ -295,6 +295,8 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 where = {"x": 0.0, "y": 0.0} if name == "place" else NO_AREA
                 rest.tables[name][i] = stand_in | where
                 rest.undecidable.update(_unnamed("place", tables[name][i]))
+            case ("zone_file", int(i), *_):
+                rest.tables.pop("zone_file", None)
             case ("alarm", int(i), *_):
                 stand_in = _stand_in(tables["alarm"][i], str(i))
                 rest.tables["alarm"][i] = {"id": stand_in["id"], "text": "?", "lost": "link"}

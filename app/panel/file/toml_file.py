@@ -244,7 +244,7 @@ FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
     "log", "control", "record", "demo", "robot", "source", "interlock", "alarm", "alarms", "place",
     "diagnostics", "page", "group", "frame", "brand", "state", "detail", "widget", "qos", "confirm",
-    "options", "states", "zone",
+    "options", "states", "zone", "zone_file",
     *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8

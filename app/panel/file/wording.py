@@ -58,6 +58,8 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "places": 'ids of places: write ["dock"]',
     "points": "points, like [[0.0, 0.0], [2.0, 0.0], [2.0, 1.5]]",
     "zone": "tables: write [[zone]]",
+    "zone_file": "tables: write [[zone_file]]",
+    "holes": "lists of points, like [[[0.0, 0.0], [2.0, 0.0], [2.0, 1.5]]]",
     "screens": 'sizes in CSS pixels: write ["1280x800"]',
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",

@@ -122,10 +122,18 @@ def _named(
     for font in _tables(tables.get("font")):
         for name in _texts([font.get("regular"), font.get("bold")]):
             yield "font", name, lambda file: [file]
+    for table in _tables(tables.get("zone_file")):
+        for name in _texts([table.get("file")]):
+            yield "zone_file", name, lambda file: [file]
     for page in _tables(tables.get("page")):
         for key in OF_PAGES:
             for name in _texts([page.get(key)]):
                 yield key, name, lambda file: [file]
+        for part in (page, *_tables(page.get("group"))):
+            for widget in _tables(part.get("widget")):
+                routes = widget.get("routes")
+                for name in _texts([routes.get("file")] if isinstance(routes, dict) else []):
+                    yield "routes", name, lambda file: [file]
 
 
 def _tables(value: Any) -> list[dict[str, Any]]:

@@ -1,10 +1,13 @@
-"""The pictures of a map: its tiles, and the whole map with the robot for a page without scripts."""
+"""The pictures of a map: its tiles, and the whole map with the robot for a page without scripts. And
+its route graph."""
 
+import json
 import time
 from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
+from pydantic import BaseModel, Field
 
 from app.cell.robot.maps import Grid, overview, reduced, tile
 from app.cell.robot.transforms import Pose
@@ -15,6 +18,7 @@ from app.panel.widgets.map_view import MapView
 from app.system.errors import NotFound
 from app.system.texts import say
 from app.web.app_state import CurrentSession, CurrentState
+from app.web.large_answers import packed_answer
 from app.web.requests import Described, errors
 
 router = APIRouter()
@@ -24,7 +28,18 @@ Place = Annotated[int, Path(ge=0)]
 PNG: Final[Described] = {
     200: {"content": {"image/png": {"schema": {"type": "string", "format": "binary"}}}}
 }
+CENTIMETRES: Final = 100  # of a metre
 KEPT: Final = "private, max-age=31536000, immutable"  # another map has another path
+
+
+class RouteGraphAnswer(BaseModel):
+    """A route graph, for drawing."""
+
+    nodes: Annotated[list[int], Field(description="x, y, x, y … in centimetres of the map's frame")]
+    edges: Annotated[
+        list[int],
+        Field(description="from, to, from, to …: numbers of nodes; a pair for each direction"),
+    ]
 
 
 @router.get(
@@ -75,6 +90,24 @@ async def map_picture(
         lambda: overview(pixels, grid, theme, pose, view.radius),
     )
     return _picture(picture, "no-store")
+
+
+@router.get(
+    "/widgets/{widget}/map/routes/{version}.json",
+    response_model=RouteGraphAnswer,
+    summary="The route graph of a map: its nodes and its edges",
+    responses=errors(403, 404, 422),
+)
+async def map_routes(widget: str, version: str, request: Request, session: CurrentSession) -> Response:
+    routes = session.panel.widget(widget, MapView).routes
+    if routes is None or routes.graph.version != version:
+        raise NotFound(say("map_changed"))
+    nodes = [round(CENTIMETRES * part) for node in routes.graph.nodes for part in node]
+    edges = [end for edge in routes.graph.edges for end in edge]
+    text = json.dumps({"nodes": nodes, "edges": edges}, separators=(",", ":"))
+    answer = await packed_answer(request, text.encode())
+    answer.headers["cache-control"] = KEPT
+    return answer
 
 
 def _grid(session: RobotSession, widget: str) -> tuple[MapView, Grid]:

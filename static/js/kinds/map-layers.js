@@ -27,6 +27,8 @@ class Layers {
   #view;
   /** @type {HTMLButtonElement[]} */
   #rows;
+  /** @type {HTMLButtonElement[]} */
+  #fixed; // those of the panel's files: routes, a plan
   /** @type {(Layer | undefined)[]} */
   #layers = [];
   /** @type {Map<number, SVGPolylineElement | SVGPolygonElement>} */
@@ -42,7 +44,8 @@ class Layers {
     this.#view = view;
     this.#rows = [...root.querySelectorAll("button[data-layer]")];
     this.#body = JSON.parse(root.dataset.footprint ?? "[]");
-    for (const row of this.#rows) {
+    this.#fixed = [...root.querySelectorAll("button[data-fixed]")];
+    for (const row of [...this.#rows, ...this.#fixed]) {
       this.#check(row, !hidden(this.#name(row)));
       row.addEventListener("click", () => this.#toggle(row));
     }
@@ -91,7 +94,7 @@ class Layers {
   }
 
   get #isOpen() {
-    return Boolean(this.#rows.length) && !find(this.#root, ".map-list").hidden;
+    return this.#root.querySelector("div.map-list")?.hidden === false;
   }
 
   /** @param {boolean} isOpen */
@@ -105,7 +108,15 @@ class Layers {
   // What is wrong with the first layer that the operator has not hidden.
   #note() {
     const wrong = this.#layers.find((layer, index) => layer?.warning && this.#isWanted(index));
-    setText(find(this.#root, ".map-note"), wrong?.warning ?? "");
+    const row = this.#fixed.find(({ dataset, ariaPressed }) => dataset.warning && ariaPressed === "true");
+    setText(find(this.#root, ".map-note"), wrong?.warning ?? row?.dataset.warning ?? "");
+  }
+
+  // What is wrong with a layer of the panel's files, "" if nothing is.
+  /** @param {HTMLElement} row @param {string} warning */
+  warn(row, warning) {
+    row.dataset.warning = warning;
+    this.#note();
   }
 
   /** @param {number} index */
@@ -145,6 +156,10 @@ class Layers {
 
   #draw() {
     this.#drawBody();
+    for (const row of this.#fixed) {
+      const isShown = row.getAttribute("aria-pressed") === "true" && Boolean(this.#view.version);
+      find(this.#root, `.map-${row.dataset.fixed}`).toggleAttribute("hidden", !isShown);
+    }
     if (!this.#rows.length) return;
     for (const [index, { grid, tiles }] of this.#costs) {
       tiles.hidden = !this.#isWanted(index);

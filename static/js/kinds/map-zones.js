@@ -1,6 +1,6 @@
 // The zones of a map, under the robot: areas with their names. What may not be entered is hatched, a way has an arrow.
 
-/** @typedef {{ label: string, kind: string, points: number[][], yaw: number | null }} Zone */
+/** @typedef {{ label: string, kind: string, rings: number[][][], yaw: number | null }} Zone */
 
 const SVG = "http://www.w3.org/2000/svg";
 const ARROW = "M-26 0H26m-14-12 14 12-14 12";
@@ -33,7 +33,7 @@ export function showZones(root, view, zones) {
       const zone = element("g", { "data-zone": kind });
       const name = element("text", { "text-anchor": "middle", dy: kind === "one_way" ? "-2em" : ".36em" });
       name.textContent = label;
-      zone.append(element("polygon", {}), name);
+      zone.append(element("path", { class: "map-area" }), name);
       if (kind === "one_way") zone.append(element("path", { d: ARROW }));
       return zone;
     }),
@@ -41,14 +41,17 @@ export function showZones(root, view, zones) {
   draw(root, view);
 }
 
+/** @param {{ x: number, y: number }[]} ring */
+const outline = (ring) => `M${ring.map(({ x, y }) => `${x} ${y}`).join("L")}Z`;
+
 /** @param {HTMLElement} root @param {import("./map.js").MapView} view */
 function draw(root, view) {
-  (shown.get(root) ?? []).forEach(({ points, yaw }, number) => {
+  (shown.get(root) ?? []).forEach(({ rings, yaw }, number) => {
     const zone = root.querySelector(".map-zones")?.children[number];
-    const [polygon, name, arrow] = zone?.children ?? [];
+    const [area, name, arrow] = zone?.children ?? [];
     zone?.toggleAttribute("hidden", !view.version);
-    const corners = points.map(([x, y]) => view.at(x, y));
-    polygon?.setAttribute("points", corners.map(({ x, y }) => `${x},${y}`).join(" "));
+    const [corners, ...holes] = rings.map((ring) => ring.map(([x, y]) => view.at(x, y)));
+    area?.setAttribute("d", [corners, ...holes].map(outline).join(""));
     const [xs, ys] = [corners.map(({ x }) => x), corners.map(({ y }) => y)];
     const x = (Math.min(...xs) + Math.max(...xs)) / 2;
     const y = (Math.min(...ys) + Math.max(...ys)) / 2;

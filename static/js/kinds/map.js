@@ -1,7 +1,8 @@
 // A map: tiles of its picture in one transform, the robot over them. Fingers, the wheel and keys move and enlarge it.
 import { closest, find } from "../show.js";
 
-/** @typedef {{ version: string, width: number, height: number, resolution: number, x: number, y: number, yaw: number }} Grid */
+/** @typedef {{ x: number, y: number, yaw: number, resolution: number }} Placed */
+/** @typedef {Placed & { version: string, width: number, height: number }} Grid */
 /** @typedef {{ x: number, y: number }} Point */
 /** @typedef {(event: PointerEvent) => (() => void) | null} Taker */
 
@@ -24,10 +25,14 @@ export const equip = (root) => {
   const view = new MapView(root);
   views.set(root, view);
   if (root.querySelector(".map-list") || root.dataset.footprint) layers(root, view);
+  if (root.querySelector(".map-plan")) placePlan(root, view);
 };
 
 /** @param {HTMLElement} root @param {MapView} view */
 const layers = async (root, view) => (await import("./map-layers.js")).layersOf(root, view);
+
+/** @param {HTMLElement} root @param {MapView} view */
+const placePlan = async (root, view) => (await import("./map-plan.js")).placePlan(root, view);
 
 // The view of a map, for other scripts; undefined until the widget is equipped.
 /** @param {HTMLElement} root @returns {MapView | undefined} */
@@ -40,6 +45,10 @@ export const show = {
   zones: async (root, zones) => {
     const view = views.get(root);
     if (view && zones.length) (await import("./map-zones.js")).showZones(root, view, zones);
+  },
+  routes: async (root, routes) => {
+    const view = views.get(root);
+    if (view) (await import("./map-routes.js")).showRoutes(root, view, routes);
   },
   ...Object.fromEntries(Array.from({ length: MOST_LAYERS }, (_, index) => [`layer_${index}`, showLayer(index)])),
 };
@@ -236,8 +245,8 @@ export class MapView {
     for (const call of this.#drawn) call();
   }
 
-  // Puts tiles where their grid is.
-  /** @param {HTMLElement} layer @param {Grid} grid */
+  // Puts tiles, or a picture, where their lower left corner is.
+  /** @param {HTMLElement} layer @param {Placed} grid */
   placeTiles(layer, grid) {
     const { x, y } = this.at(grid.x, grid.y);
     const perCell = this.#perMetre * grid.resolution;

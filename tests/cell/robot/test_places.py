@@ -102,6 +102,21 @@ def test_a_circle_that_touches_a_keep_out_zone_is_in_it(x: float, y: float, is_i
     assert (keep_out_at([zone()], "a" * 16, x, y, 0.3) is not None) == is_in
 
 
+@pytest.mark.parametrize(
+    ("x", "y", "is_in"),
+    [
+        (0.4, 0.4, True),
+        (1.5, 1.0, False),  # in the hole
+        (1.1, 1.0, True),  # in the hole, too near to the zone
+        (0.9, 1.0, True),
+    ],
+)
+def test_a_hole_is_not_of_the_zone(x: float, y: float, is_in: bool) -> None:
+    square = [[0, 0], [3, 0], [3, 3], [0, 3]]
+    with_hole = zone(points=square, holes=[[[1, 0.5], [2, 0.5], [2, 2], [1, 2]]])
+    assert (keep_out_at([with_hole], "a" * 16, x, y, 0.3) is not None) == is_in
+
+
 def test_other_zones_and_those_of_other_maps_are_only_shown() -> None:
     others = [zone(kind="speed"), zone(kind="label"), zone(map_version="b" * 16)]
     assert keep_out_at(others, "a" * 16, 1.0, 0.5, 0.3) is None

@@ -2,6 +2,7 @@
 
 import math
 import time
+from pathlib import Path
 from types import SimpleNamespace as Message
 from typing import Any, Final
 
@@ -9,7 +10,11 @@ import pytest
 
 from app.cell.robot.maps import GRID_TYPE, read_grid
 from app.cell.robot.state import RobotState, Sample
+from app.cell.view.map_values import map_view
 from app.cell.view.view import build_view
+from app.panel.geojson import read_route_graph
+from app.panel.widgets.map_view import MapRoutes
+from tests.support.beside_panel import feature, put_geojson
 from tests.support.builders import BRIDGE, INTERFACES, NOW, endpoint, panel_of, robot_there
 from tests.support.words import english
 
@@ -170,3 +175,31 @@ def test_transforms_of_another_type_are_named() -> None:
     view = shown(panel, robot)
     assert (view["state"], view["pose"]) == ("old", None)
     assert view["note"].startswith("/tf is std_msgs/msg/String")
+
+
+@pytest.mark.parametrize(
+    ("properties", "frame", "note"),
+    [
+        ({}, "odom", ""),
+        ({"frame": "map"}, "map", ""),
+        (
+            {"frame": "map"},
+            "odom",
+            "The routes are in the frame map, the map is in odom: they are not drawn.",
+        ),
+    ],
+)
+def test_routes_in_another_frame_than_the_map_are_not_drawn(
+    tmp_path: Path, properties: dict[str, Any], frame: str, note: str
+) -> None:
+    file = put_geojson(tmp_path / "ways.geojson", feature("Point", [0.0, 1.0], id=1, **properties))
+    graph = read_route_graph(file)
+    panel, robot = robot_with(frame)
+    moved(robot, 1.0)
+    routes = MapRoutes.model_construct(file=file)
+    view = panel.map_views["hall"].model_copy(update={"routes": routes})
+    attributes = english(map_view(view, robot, NOW)[0])
+    assert attributes["routes"] == {"version": "" if note else graph.version, "note": note}
+    assert attributes["layer_note"] == note
+    robot.maps["map"].grid = None
+    assert map_view(view, robot, NOW)[0]["routes"] == {"version": "", "note": ""}
