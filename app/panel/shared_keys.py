@@ -3,7 +3,7 @@ them. `docs/_generate/panel_keys.toml` says once what each means."""
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -139,6 +139,12 @@ class RobotKey(Description):
     each."""
 
     robot: Id | None = None
+
+
+class RobotsKey(Description):
+    """Whether a table shows the robot whose page it is on, or all robots."""
+
+    robots: Literal["this", "all"] = "this"
 
 
 class NeedsKey(Description):

@@ -108,6 +108,11 @@ LAYER: Final = {"shows": "scan", "topic": "/scan"}
 MAP_PLAN: Final = {"src": "box.svg", "resolution": 1.0}
 NO_WAY: Final = say("transform_unknown", base="laser", fixed="map", name="laser")
 NO_SCAN: Final = {"label": say("map_layer_scan"), "state": "unplaced", "note": NO_WAY}
+ABSENT: Final = {"robot": "example_cell_1", "name": "Cell 1", "label": "Cell 1", "state": "absent"}
+OTHERS: Final = {
+    "robots": [ABSENT | {"pose": None, "note": say("map_robot_elsewhere")}],
+    "robots_note": say("map_robot_note", name="Cell 1", note=say("map_robot_elsewhere")),
+}
 MAPS: Final = (
     Example("waiting", "map", MAP, {"state": "waiting", "note": say("map_waiting")} | NOWHERE),
     Example("unreadable", "map", MAP, {"state": "unreadable", "note": say("map_empty")} | NOWHERE),
@@ -119,6 +124,12 @@ MAPS: Final = (
         | NOWHERE
         | {"layer_0": NO_SCAN}
         | {"layer_note": say("map_layer_note", layer=say("map_layer_scan"), note=NO_WAY)},
+    ),
+    Example(
+        "another robot left out",
+        "map",
+        MAP | {"robots": "all"},
+        {"state": "live", "note": ""} | NOWHERE | OTHERS,
     ),
 )
 PLACE: Final[Table] = {"label": texts.PLACES.table, "map": "hall", "touch": True}

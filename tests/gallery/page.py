@@ -39,6 +39,7 @@ async def gallery(request: Request, state: CurrentState) -> Response:
     words |= {
         "robot_names": {},
         "tile_pages": robots.tile_pages,
+        "robot_pages": robots.tile_pages,
         "overview_robots": say("overview_robots", count=number(str(len(robots.robots)))),
     }
     html = state.templates.render(

@@ -139,6 +139,15 @@ def test_a_panel_without_a_map_says_so(tmp_path: Path) -> None:
     assert "the panel has none" in faults(tmp_path, GOAL)["page[0].widget[0].map"]
 
 
+def test_a_map_of_all_robots_is_on_a_page_of_each(tmp_path: Path) -> None:
+    hall = HALL | {"robots": "all"}
+    assert "no [[robot]] table" in faults(tmp_path, hall)["page[0].widget[0].robots"]
+    names = [{"id": name, "name": name, "namespace": f"/{name}"} for name in ("left", "right")]
+    assert faults(tmp_path, hall, robot=names) == {}
+    messages = faults(tmp_path, hall | {"robot": "left"}, robot=names)
+    assert 'this map is of "left"' in messages["page[0].widget[0].robots"]
+
+
 def test_only_a_press_sends_a_place(tmp_path: Path) -> None:
     zero = {"x": 0.0, "y": 0.0, "z": 0.0}
     hold: dict[str, Any] = {

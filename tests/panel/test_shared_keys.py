@@ -27,7 +27,7 @@ from app.panel import Panel, load_panel
 from app.panel.file.keys import inner_model
 from app.panel.file.load import faults_of_text
 from app.panel.file.same_widgets import NAME as SAME
-from app.panel.shared_keys import AgeKey, FieldKeys, NeedsKey, NumberKeys, RobotKey
+from app.panel.shared_keys import AgeKey, FieldKeys, NeedsKey, NumberKeys, RobotKey, RobotsKey
 from app.panel.widgets.displays import Readout, StatesKey
 from app.panel.widgets.families import BaseWidget, Command
 from app.panel.widgets.key_parts import ConfirmationKeys
@@ -56,6 +56,7 @@ ONE: Final[Mapping[str, tuple[type[BaseModel], ...]]] = {
     **dict.fromkeys(("unit", "scale", "offset"), (NumberKeys,)),
     "format": (NumberKeys, Readout),  # a time too
     "robot": (RobotKey,),
+    "robots": (RobotsKey,),
     "needs": (NeedsKey,),
     **dict.fromkeys(("span", "rows", "grow", "show_label"), (BaseWidget,)),
     "interlocks": (Command,),
@@ -89,6 +90,7 @@ OTHERS: Final[Mapping[str, frozenset[str]]] = {
     "offset": frozenset({"number", "slider"}),
     "interlocks": frozenset({"panel"}),
     "consequence": frozenset({"alarm"}),
+    "robots": frozenset({"panel"}),
 }
 # Those whose type is that of a service, too: the reference says the same of both.
 OF_SERVICES: Final = frozenset({"options_from", "switch", "recipe"})

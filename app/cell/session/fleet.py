@@ -27,6 +27,7 @@ from app.cell.session.session import RobotSession, ServerParts, wire_session
 from app.cell.view.group_stops import StopOfRobot, group_stop
 from app.cell.view.kinds import Attributes
 from app.cell.view.link_status import Lamp
+from app.cell.view.map_robots import RobotOnMap, other_robots, robot_on_map
 from app.cell.view.overview import TileFigure, Tiles, figure_now, most_urgent
 from app.cell.view.publisher import ViewPublisher, difference
 from app.cell.view.view import NO_SHARED, SharedWidgets, ViewWithDeadlines
@@ -128,6 +129,10 @@ class Fleet:
         self._has_overview = any(page.overview for page in panel.pages)
         self._group_stops = {entry.id: stops_of_several(panel, entry.id) for entry in panel.robots}
         self._shown_stops: dict[str, Sequence[Attributes]] = {}  # by the robot's id
+        self._maps_of_all = frozenset(
+            name for name, each in panel.map_views.items() if panel.robots and each.robots == "all"
+        )
+        self._shown_on_maps: dict[str, Sequence[RobotOnMap]] = {}  # by the robot's id
         self._has_total = any(page.total for page in panel.pages)
         words = [state.text for state in panel.state.states] if panel.state else []
         readout = next((entry.figure for entry in panel.robots if entry.figure), None)
@@ -268,6 +273,7 @@ class Fleet:
         sessions = {name: self._sessions[name] for name in others if name in self._sessions}
         widgets = {**self._tiles()} if self._has_overview else {}
         widgets |= self._stops_of_several(robot)
+        widgets |= self._maps_with_others(robot)
         if not (sessions or widgets):
             return NO_SHARED
         without: dict[str, Mapping[str, Attributes]] = {}
@@ -282,7 +288,10 @@ class Fleet:
 
     def share(self, robot: RobotState) -> None:
         if not (
-            self._has_overview or robot.id in self._widget_robots.values() or self._stops_differ(robot)
+            self._has_overview
+            or robot.id in self._widget_robots.values()
+            or self._stops_differ(robot)
+            or self._has_moved(robot)
         ):
             return
         # Sums get old by time alone.
@@ -319,6 +328,7 @@ class Fleet:
 
     def watched(self, robot: RobotState, widgets: Collection[str]) -> frozenset[str]:
         own = {widget for widget, name in self._widget_robots.items() if name == robot.id}
+        own |= self._maps_of_all
         if not own:
             return frozenset()
         own = own.intersection(widgets)
@@ -327,8 +337,39 @@ class Fleet:
 
     def _watch(self, session: RobotSession) -> None:
         """Clients see other pages of the session than before."""
-        for other in (session, *self.sharing(session)):
+        shared = self.sessions if self._maps_of_all else (session, *self.sharing(session))
+        for other in shared:
             other.watch()
+
+    def _maps_with_others(self, robot: RobotState) -> Mapping[str, Attributes]:
+        """The attributes of the maps of several robots on pages of `robot`, by their ids."""
+        name = robot.id or ""
+        if not self._maps_of_all or name not in self._sessions:  # else not wired yet
+            return {}
+        own = self._sessions[name].refresher.own.view["widgets"]
+        others = [session for session in self.sessions if session.robot is not robot]
+        shown: dict[str, Attributes] = {}
+        for map_id in self._maps_of_all:
+            rows = [
+                (
+                    str(other.robot.id),
+                    other.robot.title,
+                    robot_on_map(other.refresher.own.view["widgets"][map_id]),
+                )
+                for other in others
+            ]
+            shown[map_id] = {**own[map_id], **other_robots(own[map_id], rows)}
+        return shown
+
+    def _has_moved(self, robot: RobotState) -> bool:
+        """Whether what maps of several show of the robot has changed since this was asked last."""
+        name = robot.id or ""
+        if not self._maps_of_all or name not in self._sessions:
+            return False
+        widgets = self._sessions[name].refresher.own.view["widgets"]
+        shown = [robot_on_map(widgets[map_id]) for map_id in sorted(self._maps_of_all)]
+        before, self._shown_on_maps[name] = self._shown_on_maps.get(name), shown
+        return shown != before
 
     def _stops_of_several(self, robot: RobotState) -> Mapping[str, Attributes]:
         """The attributes of the stop buttons of several robots on pages of `robot`, by their ids."""

@@ -8,6 +8,7 @@ from app.cell.permission.verdict import topic_mismatch
 from app.cell.robot.maps import Geometry
 from app.cell.robot.state import RobotState
 from app.cell.view.map_layer_values import grid_values, map_layer, no_layer
+from app.cell.view.map_robots import without_others
 from app.panel.places import Zone
 from app.panel.widgets.map_view import MapView
 from app.system.clock import format_time
@@ -53,6 +54,7 @@ def map_view(widget: MapView, robot: RobotState, now: float) -> tuple[dict[str, 
         "layer_note": next(filter(None, warnings), ""),
         **{f"layer_{number}": dict(layer.attributes) for number, layer in enumerate(layers)},
         **routes,
+        **without_others(widget, shown.age),
     }, min([shown.until, *(layer.until for layer in layers)])
 
 
@@ -104,4 +106,5 @@ def _without_map(widget: MapView, state: str, note: TextLike) -> dict[str, Any]:
         "layer_note": "",
         **{f"layer_{number}": no_layer(layer) for number, layer in enumerate(widget.layers)},
         **_routes(widget, ""),
+        **without_others(widget, ""),
     }

@@ -19,6 +19,7 @@ from app.panel.checks.robots import (
     choice_faults,
     duplicate_ids,
     figure_faults,
+    map_faults,
     overview_faults,
     robot_faults,
     robot_name_faults,
@@ -209,6 +210,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from robot_name_faults(panel)
     yield from overview_faults(panel)
     yield from choice_faults(panel)
+    yield from map_faults(panel)
     yield from robot_text_faults(panel)
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")

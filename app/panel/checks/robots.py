@@ -12,6 +12,7 @@ from app.panel.template import input_ids
 from app.panel.times import TIME_FORMATS
 from app.panel.widgets.families import CheckContext, Command
 from app.panel.widgets.inputs import SelectInput
+from app.panel.widgets.map_view import MapView
 from app.panel.widgets.place import PlaceInput
 from app.ros.dialects.dialect import WITH_OWN_DOMAIN
 from app.ros.messages import Interfaces
@@ -99,6 +100,23 @@ def choice_faults(panel: Panel) -> Iterator[Fault]:
                         f' so write robot = "{selects[name]}" here too'
                     )
                     yield Fault(f"page[{p}].{place}", message, cause=f"robot {name}")
+
+
+def map_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of maps of all robots, which have to be on a page of each."""
+    robots = widget_robots(panel)
+    for p, page in enumerate(panel.pages):
+        for place, widget in page.placed():
+            if not isinstance(widget, MapView) or widget.robots == "this":
+                continue
+            at, robot = f"page[{p}].{place}.robots", robots.get(str(widget.id))
+            if not panel.robots:
+                message = "is for several robots: this panel has no [[robot]] table"
+                yield Fault(at, message, cause="robot map")
+            elif robot is not None:
+                message = f'is "all", and this map is of "{robot}": a map of all robots is on a page of'
+                message += " each, so leave out robot here and on its page"
+                yield Fault(at, message, cause=f"robot {robot}")
 
 
 def figure_faults(panel: Panel, checking: CheckContext) -> Iterator[Fault]:

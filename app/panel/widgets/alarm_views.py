@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from app.panel.base import Rows, distinct
 from app.panel.file.wording import no_such
-from app.panel.shared_keys import Priorities
+from app.panel.shared_keys import Priorities, RobotsKey
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
@@ -30,7 +30,7 @@ Groups = Annotated[
 ]
 
 
-class AlarmView(DisplayWidget):
+class AlarmView(RobotsKey, DisplayWidget):
     """Shows the alarms of some `group`s and `priorities`; without these keys of all. `robots`: those of
     the robot whose page it is on, or of all robots."""
 
@@ -38,7 +38,6 @@ class AlarmView(DisplayWidget):
 
     group: Groups = ()
     priorities: Priorities = ()
-    robots: Literal["this", "all"] = "this"
 
     def sources(self) -> Iterator[TopicSource]:
         yield from ()  # alarms listen to their topics

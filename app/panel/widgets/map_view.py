@@ -19,7 +19,7 @@ from app.panel.base import (
 )
 from app.panel.geojson import RouteGraph, read_route_graph
 from app.panel.places import FrameName, Metres, Yaw
-from app.panel.shared_keys import AgeKey, TopicKeys
+from app.panel.shared_keys import AgeKey, RobotsKey, TopicKeys
 from app.panel.widgets.displays import PictureName, picture_faults
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
 from app.panel.widgets.map_layers import GRID_TYPE, MAX_LAYERS, Corners, MapLayer, updates_of
@@ -89,11 +89,11 @@ class MapPlan(Description):
     label: Label | None = None
 
 
-class MapView(AgeKey, TopicWidget, DisplayWidget):
+class MapView(RobotsKey, AgeKey, TopicWidget, DisplayWidget):
     """Shows a map (`nav_msgs/msg/OccupancyGrid`) with the robot: by its transforms from the map's frame
     to `base_frame`, or by a topic with its pose. A pose older than `max_age_s` is drawn as old, where
     the robot was last seen. `layers` are drawn over the map; `footprint` has the robot's corners in
-    `base_frame`, in metres."""
+    `base_frame`, in metres. `robots`: on a page of several robots the others may be shown too."""
 
     kind: Literal["map"]
     topic: TopicName = "/map"

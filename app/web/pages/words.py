@@ -87,6 +87,7 @@ WORDS: Final = (
     "map_layer_plan",
     "map_layer_routes",
     "map_plan_broken",
+    "map_robots",
     "place_choose",
     "place_choose_touch",
     "place_all_locked",

@@ -189,7 +189,7 @@ const followed = new WeakMap();
 
 // The further events of a finger on a map, until it is lifted; null: no more of them.
 /** @param {HTMLElement} map @param {PointerEvent} first @param {Calls | null} calls */
-function follow(map, first, calls) {
+export function follow(map, first, calls) {
   followed.get(map)?.abort();
   if (!calls) return;
   const until = new AbortController();

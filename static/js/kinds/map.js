@@ -50,6 +50,10 @@ export const show = {
     const view = views.get(root);
     if (view) (await import("./map-routes.js")).showRoutes(root, view, routes);
   },
+  robots: async (root, robots) => {
+    const view = views.get(root);
+    if (view) (await import("./map-robots.js")).showRobots(root, view, robots);
+  },
   ...Object.fromEntries(Array.from({ length: MOST_LAYERS }, (_, index) => [`layer_${index}`, showLayer(index)])),
 };
 
@@ -132,6 +136,11 @@ export class MapView {
     return this.#pose;
   }
 
+  // How many pixels a metre is.
+  get perMetre() {
+    return this.#perMetre;
+  }
+
   // Of the view, in pixels.
   get width() {
     return this.#view.clientWidth;
@@ -151,10 +160,11 @@ export class MapView {
 
   // `take` gets the "pointerdown" of a first finger. If it returns a function, the finger does not move the map, and
   // its further events on `.map-view` are for the caller. The function is called if a second finger ends that:
-  // two move and enlarge the map.
+  // two move and enlarge the map. `isFirst`: it is asked before the others.
   /** @param {Taker} take */
-  onPointer(take) {
-    this.#takers.push(take);
+  onPointer(take, isFirst = false) {
+    if (isFirst) this.#takers.unshift(take);
+    else this.#takers.push(take);
   }
 
   // Where a point of the map's frame, in metres, is in the view, in pixels.
@@ -372,7 +382,7 @@ export class MapView {
 
   /** @param {string | undefined} what */
   #do(what) {
-    if (what === "layers") return;
+    if (what === "layers" || what === "robots") return;
     if (what === "in") this.#zoom(STEP);
     else if (what === "out") this.#zoom(1 / STEP);
     else if (what === "whole") [this.#isWhole, this.#follows] = [true, false];
