@@ -20,8 +20,8 @@ from app.ros.messages.validation import format_value
 
 MAX_BYTES: Final = 4_000_000
 MAX_FEATURES: Final = 20_000
-MAX_NODES: Final = 5_000
-MAX_EDGES: Final = 15_000
+MAX_NODES: Final = 2_000
+MAX_EDGES: Final = 8_000
 MAX_FAULTS: Final = 10  # that are named of a file
 MAX_POINTS: Final = 10_000  # of all zones of a file
 MAX_ID: Final = 2**53

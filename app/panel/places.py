@@ -54,6 +54,15 @@ def _check_corners(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float
     return points
 
 
+def _check_holes(value: Any) -> Any:
+    first = value[0] if isinstance(value, list) and value else None
+    if isinstance(first, list) and first and not isinstance(first[0], list | tuple):
+        raise ValueError(
+            "must be a list of holes, each a list of points: write [[[0, 0], [2, 0], [2, 1]]]"
+        )
+    return value
+
+
 Yaw = Annotated[FiniteNumber, AfterValidator(_check_yaw)]
 CORNER: Final = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 Corner = Annotated[tuple[float, float], BeforeValidator(_check_corner), WithJsonSchema(CORNER)]
@@ -85,7 +94,9 @@ class Zone(RobotKey):
     label: Label
     kind: ZoneKind
     points: Corners
-    holes: Annotated[tuple[Corners, ...], Field(strict=False, max_length=MAX_HOLES)] = ()
+    holes: Annotated[
+        tuple[Corners, ...], Field(strict=False, max_length=MAX_HOLES), BeforeValidator(_check_holes)
+    ] = ()
     yaw: Yaw | None = None
     map_version: MapVersion | None = None
 

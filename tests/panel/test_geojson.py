@@ -259,8 +259,8 @@ def test_a_fault_of_a_route_graph_names_its_file_and_its_feature(
 
 def test_a_route_graph_has_so_many_nodes_and_edges_at_most(tmp_path: Path) -> None:
     nodes = [feature("Point", [name, 0], id=name) for name in range(MAX_NODES + 1)]
-    assert graph(tmp_path, *nodes).faults == ("ways.geojson has 5001 nodes: 5000 at most",)
+    assert graph(tmp_path, *nodes).faults == ("ways.geojson has 2001 nodes: 2000 at most",)
     edges = [feature("LineString", [], startid=0, endid=1)] * (MAX_EDGES + 1)
     few = graph(tmp_path, *nodes[:2], *edges).faults
-    assert few == ("ways.geojson has 15001 edges: 15000 at most",)
+    assert few == ("ways.geojson has 8001 edges: 8000 at most",)
     assert len(json.dumps(edges)) < MAX_BYTES

@@ -1,6 +1,7 @@
 // The layers of a map: paths and outlines as SVG, a scan on a canvas, costmaps as tiles. The operator hides any of
 // them: that choice is the browser's. What the server says is old or has no place is not drawn.
 import { find, setText } from "../show.js";
+import { clearedCanvas } from "./map-canvas.js";
 
 /** @typedef {import("./map.js").Grid} Grid */
 /** @typedef {{ points?: number[], ellipse?: number[], grid?: Grid }} Drawn */
@@ -165,7 +166,7 @@ class Layers {
       tiles.hidden = !this.#isWanted(index);
       this.#view.placeTiles(tiles, grid);
     }
-    const context = this.#clearedCanvas();
+    const context = clearedCanvas(find(this.#root, "canvas.map-points"));
     const origin = this.#view.at(0, 0);
     const perCentimetre = (this.#view.at(1, 0).x - origin.x) / 100;
     const group = find(this.#root, ".map-shapes");
@@ -229,19 +230,6 @@ class Layers {
     const { x, y } = this.#view.at(pose[0], pose[1]);
     body.setAttribute("points", this.#body.map(([ahead, left]) => `${ahead * perMetre},${-left * perMetre}`).join(" "));
     body.setAttribute("transform", `translate(${x} ${y}) rotate(${(-pose[2] * 180) / Math.PI})`);
-  }
-
-  #clearedCanvas() {
-    const canvas = find(this.#root, "canvas.map-points");
-    const { clientWidth, clientHeight } = canvas;
-    const [width, height] = [clientWidth * devicePixelRatio, clientHeight * devicePixelRatio].map(Math.round);
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-    const context = canvas.getContext("2d");
-    if (!context) return null;
-    context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
-    context.clearRect(0, 0, clientWidth, clientHeight);
-    context.fillStyle = getComputedStyle(canvas).color;
-    return context;
   }
 }
 

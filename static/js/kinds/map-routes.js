@@ -1,70 +1,133 @@
-// The route graph of a map: its edges as lines, with an arrow where one leads in one direction only, its nodes as dots.
+// The route graph of a map on a canvas: its edges as lines, with an arrow where one leads in one direction only, its
+// nodes as dots. It is drawn again only when the view has moved: a large graph takes some tens of milliseconds.
 import { find, setText } from "../show.js";
+import { clearedCanvas } from "./map-canvas.js";
 import { layersOf } from "./map-layers.js";
 
 /** @typedef {{ version: string, note: string }} Routes */
 /** @typedef {{ nodes: number[], edges: number[] }} Graph x, y … in centimetres; from, to … as numbers of nodes */
+/** @typedef {{ x: number, y: number }} Point */
 
-const ARROW_CM = 25;
-const MOST_OF_EDGE = 0.3; // that an arrow takes of a short edge
+const LINE_PX = 2;
+const DOT_PX = 4; // radius
+const ARROW_PX = 7;
+const LEAST_PX = 24; // of an edge with an arrow
+const MARGIN_PX = 20; // around the view, in which dots and arrows may be seen
 
-/** @type {WeakMap<HTMLElement, string>} */
-const shown = new WeakMap();
+/** @type {WeakMap<HTMLElement, RoutesView>} */
+const known = new WeakMap();
 
 /** @param {HTMLElement} root @param {import("./map.js").MapView} view @param {Routes} routes */
-export async function showRoutes(root, view, { version, note }) {
-  if (!shown.has(root)) view.onDraw(() => place(root, view));
-  const before = shown.get(root);
-  shown.set(root, version);
-  const row = find(root, "button[data-fixed='routes']");
-  setText(row.querySelector("small"), note);
-  layersOf(root, view).warn(row, note);
-  if (version === before) return;
-  draw(root, { nodes: [], edges: [] });
-  if (!version) return;
-  const response = await fetch(`${pageGuard.page.base}/widgets/${root.dataset.widget}/map/routes/${version}.json`);
-  if (shown.get(root) !== version) return;
-  if (response.ok) draw(root, await response.json());
-  else shown.set(root, ""); // it is asked for again with the next map
+export function showRoutes(root, view, routes) {
+  const shown = known.get(root) ?? new RoutesView(root, view);
+  known.set(root, shown);
+  shown.show(routes);
 }
 
-/** @param {HTMLElement} root @param {Graph} graph */
-function draw(root, { nodes, edges }) {
-  const known = new Set();
-  for (let at = 0; at < edges.length; at += 2) known.add(`${edges[at]} ${edges[at + 1]}`);
-  const lines = [];
-  for (let at = 0; at < edges.length; at += 2) {
-    const [from, to] = [edges[at], edges[at + 1]];
-    const isTwoWay = known.has(`${to} ${from}`);
-    if (isTwoWay && from > to) continue;
-    const [x, y, endX, endY] = [nodes[2 * from], nodes[2 * from + 1], nodes[2 * to], nodes[2 * to + 1]];
-    lines.push(`M${x} ${y}L${endX} ${endY}`);
-    if (!isTwoWay) lines.push(arrow(x, y, endX - x, endY - y));
+class RoutesView {
+  /** @type {HTMLElement} */
+  #root;
+  /** @type {import("./map.js").MapView} */
+  #view;
+  /** @type {HTMLCanvasElement} */
+  #canvas;
+  #version = "";
+  /** @type {Graph} */
+  #graph = { nodes: [], edges: [] };
+  /** @type {boolean[]} */
+  #isOneWay = []; // by edge
+  #drawn = ""; // what the canvas shows
+
+  /** @param {HTMLElement} root @param {import("./map.js").MapView} view */
+  constructor(root, view) {
+    [this.#root, this.#view, this.#canvas] = [root, view, find(root, "canvas.map-routes")];
+    view.onDraw(() => this.#draw());
+    new MutationObserver(() => view.draw()).observe(this.#canvas, { attributeFilter: ["hidden"] });
   }
-  const dots = [];
-  for (let at = 0; at < nodes.length; at += 2) dots.push(`M${nodes[at]} ${nodes[at + 1]}h.01`);
-  const [edgesPath, nodesPath] = find(root, ".map-routes").children;
-  edgesPath.setAttribute("d", lines.join(""));
-  nodesPath.setAttribute("d", dots.join(""));
+
+  /** @param {Routes} routes */
+  async show({ version, note }) {
+    const row = find(this.#root, "button[data-fixed='routes']");
+    setText(row.querySelector("small"), note);
+    layersOf(this.#root, this.#view).warn(row, note);
+    if (version === this.#version) return;
+    this.#version = version;
+    this.#take({ nodes: [], edges: [] });
+    if (!version) return;
+    const path = `${pageGuard.page.base}/widgets/${this.#root.dataset.widget}/map/routes/${version}.json`;
+    const response = await fetch(path);
+    if (version !== this.#version) return;
+    if (response.ok) this.#take(await response.json());
+    else this.#version = ""; // it is asked for again with the next change
+  }
+
+  /** @param {Graph} graph */
+  #take(graph) {
+    this.#graph = graph;
+    const { edges } = graph;
+    const ways = new Set();
+    for (let at = 0; at < edges.length; at += 2) ways.add(`${edges[at]} ${edges[at + 1]}`);
+    this.#isOneWay = Array.from(
+      { length: edges.length / 2 },
+      (_, n) => !ways.has(`${edges[2 * n + 1]} ${edges[2 * n]}`),
+    );
+    this.#drawn = "";
+    this.#canvas.dataset.edges = String(edges.length / 2);
+    this.#view.draw();
+  }
+
+  #draw() {
+    const canvas = this.#canvas;
+    if (canvas.hidden) return;
+    const { x, y } = this.#view.at(0, 0);
+    const perCentimetre = (this.#view.at(1, 0).x - x) / 100;
+    const { clientWidth: width, clientHeight: height } = canvas;
+    const key = [x, y, perCentimetre, width, height, document.documentElement.dataset.theme].join(" ");
+    if (key === this.#drawn || !Number.isFinite(perCentimetre)) return;
+    const context = clearedCanvas(canvas);
+    if (!context) return;
+    this.#drawn = key;
+    const { nodes, edges } = this.#graph;
+    const points = Array.from({ length: nodes.length / 2 }, (_, n) => ({
+      x: x + perCentimetre * nodes[2 * n],
+      y: y - perCentimetre * nodes[2 * n + 1],
+    }));
+    context.lineWidth = LINE_PX;
+    this.#isOneWay.forEach((isOneWay, n) => {
+      const [from, to] = [points[edges[2 * n]], points[edges[2 * n + 1]]];
+      if ((isOneWay || edges[2 * n] < edges[2 * n + 1]) && isSeen(from, to, width, height))
+        drawEdge(context, from, to, isOneWay);
+    });
+    for (const point of points) {
+      if (!isSeen(point, point, width, height)) continue;
+      context.beginPath();
+      context.arc(point.x, point.y, DOT_PX, 0, 2 * Math.PI);
+      context.fill();
+    }
+  }
 }
 
-// In the middle of an edge.
-/** @param {number} x @param {number} y @param {number} dx @param {number} dy */
-function arrow(x, y, dx, dy) {
+/** @param {Point} from @param {Point} to @param {number} width @param {number} height */
+const isSeen = (from, to, width, height) =>
+  Math.max(from.x, to.x) > -MARGIN_PX &&
+  Math.max(from.y, to.y) > -MARGIN_PX &&
+  Math.min(from.x, to.x) < width + MARGIN_PX &&
+  Math.min(from.y, to.y) < height + MARGIN_PX;
+
+// Each by itself: one path of all of them takes a hundred times as long.
+/** @param {CanvasRenderingContext2D} context @param {Point} from @param {Point} to @param {boolean} isOneWay */
+function drawEdge(context, from, to, isOneWay) {
+  context.beginPath();
+  context.moveTo(from.x, from.y);
+  context.lineTo(to.x, to.y);
+  const [dx, dy] = [to.x - from.x, to.y - from.y];
   const length = Math.hypot(dx, dy);
-  if (!length) return "";
-  const size = Math.min(ARROW_CM, MOST_OF_EDGE * length);
-  const [ahead, aside] = [(dx * size) / length, (dy * size) / length];
-  const [tipX, tipY] = [x + (dx + ahead) / 2, y + (dy + aside) / 2];
-  const wings = [-1, 1].map((side) => `${tipX - ahead - side * aside * 0.6} ${tipY - aside + side * ahead * 0.6}`);
-  return `M${wings[0]}L${tipX} ${tipY}L${wings[1]}`;
-}
-
-/** @param {HTMLElement} root @param {import("./map.js").MapView} view */
-function place(root, view) {
-  const origin = view.at(0, 0);
-  const perCentimetre = (view.at(1, 0).x - origin.x) / 100;
-  if (!Number.isFinite(perCentimetre)) return;
-  const transform = `translate(${origin.x} ${origin.y}) scale(${perCentimetre} ${-perCentimetre})`;
-  find(root, ".map-routes").setAttribute("transform", transform);
+  if (isOneWay && length >= LEAST_PX) {
+    const [ahead, aside] = [(dx * ARROW_PX) / length, (dy * ARROW_PX) / length];
+    const [x, y] = [from.x + dx / 2 + ahead, from.y + dy / 2 + aside];
+    context.moveTo(x - ahead - aside * 0.6, y - aside + ahead * 0.6);
+    context.lineTo(x, y);
+    context.lineTo(x - ahead + aside * 0.6, y - aside - ahead * 0.6);
+  }
+  context.stroke();
 }

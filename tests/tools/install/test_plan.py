@@ -132,6 +132,8 @@ def test_files_that_the_panel_names_are_installed_with_the_panel(host: Host, tmp
         "pages/cell.html": "{{ widget('start') }}",
         "fonts/regular.ttf": "letters",
         "fonts/bold.ttf": "bold letters",
+        "maps/hall.geojson": "zones",
+        "maps/ways.geojson": "routes",
     }
     for name, text in {**files, "install/cell_msgs/lib/driver": "a program"}.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -141,6 +143,8 @@ def test_files_that_the_panel_names_are_installed_with_the_panel(host: Host, tmp
         f'interfaces = ["install", "{package}"]\npictures = "./pictures"\n'
         '[[page]]\ntemplate = "pages/cell.html"\n'
         '[[font]]\nregular = "fonts/regular.ttf"\nbold = "fonts/bold.ttf"\n'
+        '[[zone_file]]\nfile = "maps/hall.geojson"\n'
+        '[[page]]\n[[page.widget]]\nroutes = { file = "maps/ways.geojson" }\n'
     )
 
     def plan() -> list[InstallStep]:
