@@ -90,6 +90,14 @@ export function isStop(target) {
   return closest(target, STOPS) !== null;
 }
 
+/** @template {keyof SVGElementTagNameMap} K @param {K} tag @param {Record<string, string | number>} [attributes] @param {Element[]} children @returns {SVGElementTagNameMap[K]} */
+export function svgElement(tag, attributes = {}, ...children) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+  made.append(...children);
+  return made;
+}
+
 /** @param {HTMLTemplateElement} template */
 export function copyOf(template) {
   return find(document.importNode(template.content, true), "*");

@@ -114,7 +114,7 @@ def test_a_touch_where_the_robot_may_not_go_is_chosen_and_refused(
     send(page)
     expect(receipt(page)).to_have_attribute("data-outcome", "refused")
     expect(card(page)).to_be_visible()
-    card(page).locator(".unchoose").tap()
+    card(page).locator(".unchoose").click()
     expect(card(page)).to_be_hidden()
 
 
@@ -134,7 +134,9 @@ def test_a_second_finger_ends_the_touch_and_moves_the_map(shuttle: Server, touch
 
 def test_a_tap_on_a_symbol_chooses_its_place(shuttle: Server, touchscreen: Page) -> None:
     page = opened(touchscreen, shuttle)
-    symbol = place(page.locator(".map-places > g").first.locator("circle"))
+    circle = page.locator(".map-places > g").first.locator("circle")
+    expect(circle).to_be_visible()
+    symbol = place(circle)
     touch = Touch(page)
     touch.send("touchStart", (symbol["x"] + symbol["width"] / 2, symbol["y"] + symbol["height"] / 2))
     touch.send("touchEnd")

@@ -217,7 +217,8 @@ def test_the_shipped_files_are_complete() -> None:
 def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
     assets = load_assets(shipped_path("static"), shipped_path("templates"), 0.22, KINDS)
     for name, asset in assets.files.items():
-        assert b"http:" not in asset.content, name
+        content = asset.content.replace(b"http://www.w3.org/2000/svg", b"")  # the name of a namespace
+        assert b"http:" not in content, name
         assert b"https:" not in asset.content, name
         assert b"@import" not in asset.content, name
 

@@ -1,5 +1,6 @@
 // What is drawn on a map for goals: the places with their names, and what is chosen, a ring with an arrow. A finger that
 // presses and drags sets a pose with its direction.
+import { svgElement } from "../show.js";
 
 /** @typedef {import("./map.js").MapView} MapView */
 /** @typedef {{ x: number, y: number }} Point */
@@ -10,19 +11,10 @@ const TURN_PX = 22; // a drag that is shorter does not turn
 const RING_PX = 17;
 const ARROW_PX = 46;
 const PHONE = matchMedia("(max-width: 599px)"); // it only shows
-const SVG = "http://www.w3.org/2000/svg";
-
-/** @param {string} tag @param {Record<string, string | number>} attributes @param {Element[]} children */
-function element(tag, attributes, ...children) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
-  made.append(...children);
-  return made;
-}
 
 /** @param {HTMLElement} map @param {string} name */
 function layer(map, name) {
-  const made = element("g", { class: name });
+  const made = svgElement("g", { class: name });
   map.querySelector("svg.map-marks")?.append(made);
   return made;
 }
@@ -54,9 +46,9 @@ export class Places {
     [this.#places, this.#chosen] = [places, chosen];
     this.#layer.replaceChildren(
       ...places.map(({ label }) => {
-        const text = element("text", { x: RING_PX - 2, dy: ".36em" });
+        const text = svgElement("text", { x: RING_PX - 2, dy: ".36em" });
         text.textContent = label;
-        return element("g", {}, element("circle", { r: 9 }), text);
+        return svgElement("g", {}, svgElement("circle", { r: 9 }), text);
       }),
     );
     this.#draw();
@@ -107,7 +99,10 @@ export class Goal {
     this.#map = map;
     this.#view = view;
     this.#mark = layer(map, "map-goal");
-    this.#mark.append(element("circle", { r: RING_PX }), element("path", { d: `M0 0H${ARROW_PX}m-12-10 12 10-12 10` }));
+    this.#mark.append(
+      svgElement("circle", { r: RING_PX }),
+      svgElement("path", { d: `M0 0H${ARROW_PX}m-12-10 12 10-12 10` }),
+    );
     view.onDraw(() => this.#draw());
   }
 

@@ -1,6 +1,6 @@
 // The layers of a map: paths and outlines as SVG, a scan on a canvas, costmaps as tiles. The operator hides any of
 // them: that choice is the browser's. What the server says is old or has no place is not drawn.
-import { find, setText } from "../show.js";
+import { find, setText, svgElement } from "../show.js";
 import { clearedCanvas } from "./map-canvas.js";
 
 /** @typedef {import("./map.js").Grid} Grid */
@@ -9,7 +9,6 @@ import { clearedCanvas } from "./map-canvas.js";
 
 const POINT_PX = 3; // of a scan
 const LEAST_BODY_PX = 16; // a smaller robot is drawn as its round sign
-const SVG = "http://www.w3.org/2000/svg";
 
 /** @type {WeakMap<HTMLElement, Layers>} */
 const known = new WeakMap();
@@ -192,7 +191,7 @@ class Layers {
     let shape = this.#shapes.get(index);
     if (!shape && points.length) {
       const isPath = row.dataset.shape === "path";
-      shape = document.createElementNS(SVG, isPath ? "polyline" : "polygon");
+      shape = svgElement(isPath ? "polyline" : "polygon");
       if (isPath) shape.dataset.line = row.dataset.line;
       this.#shapes.set(index, shape);
       find(this.#root, ".map-shapes").append(shape);

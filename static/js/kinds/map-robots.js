@@ -1,6 +1,6 @@
 // The other robots on a map of several, with their names: what is old is dashed and says its age. A finger on a robot, or
 // its row in the list, opens the robot's page.
-import { find, setText } from "../show.js";
+import { find, setText, svgElement } from "../show.js";
 import { follow } from "./map-goal.js";
 
 /** @typedef {import("./map.js").MapView} MapView */
@@ -9,7 +9,6 @@ import { follow } from "./map-goal.js";
 const NEAR_PX = 26; // around a robot that a finger meets
 const LEAST_PX = 11; // its radius, however small the map
 const NAME_PX = 6; // between a robot and its name
-const SVG = "http://www.w3.org/2000/svg";
 
 /** @type {WeakMap<HTMLElement, Robots>} */
 const known = new WeakMap();
@@ -21,14 +20,6 @@ export function showRobots(root, view, robots) {
   shown.show(robots);
 }
 
-/** @param {string} tag @param {Record<string, string>} attributes @param {Element[]} children */
-function element(tag, attributes, ...children) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
-}
-
 class Robots {
   /** @type {HTMLElement} */
   #root;
@@ -36,7 +27,7 @@ class Robots {
   #view;
   /** @type {Robot[]} */
   #robots = [];
-  #marks = element("g", { class: "map-others" });
+  #marks = svgElement("g", { class: "map-others" });
 
   /** @param {HTMLElement} root @param {MapView} view */
   constructor(root, view) {
@@ -70,10 +61,15 @@ class Robots {
     }
     while (this.#marks.children.length > robots.length) this.#marks.lastChild?.remove();
     while (this.#marks.children.length < robots.length) {
-      const sign = element("g", {}, element("circle", { r: "1" }), element("path", { d: "M.75 0-.5.55-.2 0-.5-.55z" }));
-      const unsure = element("text", { "text-anchor": "middle", dy: ".36em" });
+      const sign = svgElement(
+        "g",
+        {},
+        svgElement("circle", { r: "1" }),
+        svgElement("path", { d: "M.75 0-.5.55-.2 0-.5-.55z" }),
+      );
+      const unsure = svgElement("text", { "text-anchor": "middle", dy: ".36em" });
       unsure.textContent = "?";
-      this.#marks.append(element("g", {}, sign, unsure, element("text", { class: "map-name", dy: ".36em" })));
+      this.#marks.append(svgElement("g", {}, sign, unsure, svgElement("text", { class: "map-name", dy: ".36em" })));
     }
     this.#view.draw();
   }

@@ -1,16 +1,9 @@
 // The zones of a map, under the robot: areas with their names. What may not be entered is hatched, a way has an arrow.
+import { svgElement } from "../show.js";
 
 /** @typedef {{ label: string, kind: string, rings: number[][][], yaw: number | null }} Zone */
 
-const SVG = "http://www.w3.org/2000/svg";
 const ARROW = "M-26 0H26m-14-12 14 12-14 12";
-
-/** @param {string} tag @param {Record<string, string>} attributes */
-function element(tag, attributes) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
 
 /** @type {WeakMap<HTMLElement, Zone[]>} */
 const shown = new WeakMap();
@@ -22,19 +15,19 @@ export function showZones(root, view, zones) {
   const marks = root.querySelector("svg.map-marks");
   if (isFirst) {
     const hatch = `hatch-${root.dataset.widget}`;
-    const pattern = element("pattern", { id: hatch, width: "12", height: "12", patternUnits: "userSpaceOnUse" });
+    const pattern = svgElement("pattern", { id: hatch, width: "12", height: "12", patternUnits: "userSpaceOnUse" });
     pattern.setAttribute("patternTransform", "rotate(45)");
-    pattern.append(element("path", { d: "M6 0V12" }));
-    marks?.prepend(pattern, element("g", { class: "map-zones", fill: `url(#${hatch})` }));
+    pattern.append(svgElement("path", { d: "M6 0V12" }));
+    marks?.prepend(pattern, svgElement("g", { class: "map-zones", fill: `url(#${hatch})` }));
     view.onDraw(() => draw(root, view));
   }
   root.querySelector(".map-zones")?.replaceChildren(
     ...zones.map(({ label, kind }) => {
-      const zone = element("g", { "data-zone": kind });
-      const name = element("text", { "text-anchor": "middle", dy: kind === "one_way" ? "-2em" : ".36em" });
+      const zone = svgElement("g", { "data-zone": kind });
+      const name = svgElement("text", { "text-anchor": "middle", dy: kind === "one_way" ? "-2em" : ".36em" });
       name.textContent = label;
-      zone.append(element("path", { class: "map-area" }), name);
-      if (kind === "one_way") zone.append(element("path", { d: ARROW }));
+      zone.append(svgElement("path", { class: "map-area" }), name);
+      if (kind === "one_way") zone.append(svgElement("path", { d: ARROW }));
       return zone;
     }),
   );
