@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from app.cell.alarms.shown import AlarmRow
 from app.cell.commands.diagnostic_acts import Doctor, NoDoctor
@@ -27,7 +27,7 @@ from app.cell.session.session import RobotSession, ServerParts, wire_session
 from app.cell.view.group_stops import StopOfRobot, group_stop
 from app.cell.view.kinds import Attributes
 from app.cell.view.link_status import Lamp
-from app.cell.view.map_robots import RobotOnMap, other_robots, robot_on_map
+from app.cell.view.map_robots import RobotOnMap, has_only_moved, other_robots, robot_on_map
 from app.cell.view.overview import TileFigure, Tiles, figure_now, most_urgent
 from app.cell.view.publisher import ViewPublisher, difference
 from app.cell.view.view import NO_SHARED, SharedWidgets, ViewWithDeadlines
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from app.cell.session.maps import MapPictures
 
 log = logging.getLogger("kiosk.fleet")
+
+MOVES_S: Final = 0.2  # between two positions of other robots on a map
 
 
 # Interlocks and conditions of one robot that widgets of another robot name.
@@ -132,7 +134,8 @@ class Fleet:
         self._maps_of_all = frozenset(
             name for name, each in panel.map_views.items() if panel.robots and each.robots == "all"
         )
-        self._shown_on_maps: dict[str, Sequence[RobotOnMap]] = {}  # by the robot's id
+        self._on_maps: dict[str, Mapping[str, RobotOnMap]] = {}  # as shown, by the robot's id
+        self._moves: asyncio.TimerHandle | None = None  # when robots that have moved are shown
         self._has_total = any(page.total for page in panel.pages)
         words = [state.text for state in panel.state.states] if panel.state else []
         readout = next((entry.figure for entry in panel.robots if entry.figure), None)
@@ -193,6 +196,8 @@ class Fleet:
 
     def close(self) -> None:
         """Ends holds and streams, which would delay the shutdown."""
+        if self._moves is not None:
+            self._moves.cancel()
         for session in self.sessions:
             session.close()
 
@@ -287,15 +292,16 @@ class Fleet:
         return SharedWidgets(widgets, without, controls)
 
     def share(self, robot: RobotState) -> None:
+        has_moved = self._has_moved(robot)
         if not (
-            self._has_overview
+            has_moved
+            or self._has_overview
             or robot.id in self._widget_robots.values()
             or self._stops_differ(robot)
-            or self._has_moved(robot)
         ):
             return
         # Sums get old by time alone.
-        if not self._has_total and not self._differs(robot):
+        if not (self._has_total or has_moved or self._differs(robot)):
             return
         self._tiles_now = None
         if not self._sharing:
@@ -351,25 +357,40 @@ class Fleet:
         shown: dict[str, Attributes] = {}
         for map_id in self._maps_of_all:
             rows = [
-                (
-                    str(other.robot.id),
-                    other.robot.title,
-                    robot_on_map(other.refresher.own.view["widgets"][map_id]),
-                )
-                for other in others
+                (str(each.robot.id), each.robot.title, self._positions(each)[map_id]) for each in others
             ]
             shown[map_id] = {**own[map_id], **other_robots(own[map_id], rows)}
         return shown
 
+    def _positions(self, session: RobotSession) -> Mapping[str, RobotOnMap]:
+        """Where a robot is on the maps of several, by their ids, as pages show it."""
+        return self._on_maps.get(str(session.robot.id)) or self._positions_now(session)
+
+    def _positions_now(self, session: RobotSession) -> Mapping[str, RobotOnMap]:
+        widgets = session.refresher.own.view["widgets"]
+        return {map_id: robot_on_map(widgets[map_id]) for map_id in self._maps_of_all}
+
     def _has_moved(self, robot: RobotState) -> bool:
-        """Whether what maps of several show of the robot has changed since this was asked last."""
+        """Whether pages are to show now that the robot is elsewhere on maps of several. If it has only
+        moved, they show it with the others that have, five times a second."""
         name = robot.id or ""
         if not self._maps_of_all or name not in self._sessions:
             return False
-        widgets = self._sessions[name].refresher.own.view["widgets"]
-        shown = [robot_on_map(widgets[map_id]) for map_id in sorted(self._maps_of_all)]
-        before, self._shown_on_maps[name] = self._shown_on_maps.get(name), shown
-        return shown != before
+        now, before = self._positions_now(self._sessions[name]), self._on_maps.get(name)
+        if now == before:
+            return False
+        if before and all(has_only_moved(before[map_id], now[map_id]) for map_id in now):
+            if self._moves is None:
+                loop = asyncio.get_running_loop()
+                self._moves = loop.call_later(MOVES_S, self._show_moves)
+            return False
+        self._on_maps[name] = now
+        return True
+
+    def _show_moves(self) -> None:
+        self._moves = None
+        self._on_maps = {str(each.robot.id): self._positions_now(each) for each in self.sessions}
+        self._share()
 
     def _stops_of_several(self, robot: RobotState) -> Mapping[str, Attributes]:
         """The attributes of the stop buttons of several robots on pages of `robot`, by their ids."""

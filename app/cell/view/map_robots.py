@@ -33,6 +33,12 @@ def robot_on_map(shown: Mapping[str, Any]) -> RobotOnMap:
     return RobotOnMap(shown["state"], shown["note"], shown["age"], grid["version"], shown["pose"])
 
 
+def has_only_moved(before: RobotOnMap, after: RobotOnMap) -> bool:
+    """Whether a robot is only elsewhere, or older, than before: that may be shown a little later."""
+    states = [(each.state, each.version, each.pose is None) for each in (before, after)]
+    return states[0] == states[1]
+
+
 def other_robots(
     shown: Mapping[str, Any], others: Iterable[tuple[str, TextLike, RobotOnMap]]
 ) -> dict[str, Any]:

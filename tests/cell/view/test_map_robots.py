@@ -6,7 +6,7 @@ from typing import Any, Final
 import pytest
 
 from app.cell.robot.maps import GRID_TYPE, read_grid
-from app.cell.view.map_robots import other_robots, robot_on_map
+from app.cell.view.map_robots import has_only_moved, other_robots, robot_on_map
 from app.cell.view.view import FAILED
 from tests.cell.view.test_map_values import INFO, moved, robot_with, shown
 from tests.support.builders import INTERFACES, NOW
@@ -107,6 +107,13 @@ def test_a_robot_whose_map_fails_does_not_harm_the_others() -> None:
     row, _ = on(map_of(), FAILED)
     assert (row["state"], row["note"]) == ("absent", english(FAILED["note"]))
     assert other_robots(FAILED, [("r2", "Robot 2", robot_on_map(map_of()))])["robots"] == []
+
+
+def test_what_gets_old_or_is_gone_is_shown_at_once() -> None:
+    here = robot_on_map(map_of())
+    assert has_only_moved(here, robot_on_map(map_of(3.5)))
+    changed = (map_of(now=LATER), map_of(None), map_of(data=[0, 0]), FAILED)
+    assert [has_only_moved(here, robot_on_map(each)) for each in changed] == [False] * 4
 
 
 def test_several_left_out_are_all_named() -> None:
