@@ -45,10 +45,10 @@ def other_robots(
     """Attributes of a map that shows `others`, by their ids and names: `robots`, a row for each, and
     `robots_note`, which names those that are not drawn and says why. A robot is drawn only on the map
     that it has itself: the version of a map is that of its cells, its place and its frame."""
-    if shown.get("grid") is None:
-        return {"robots": [], "robots_note": ""}
-    version = shown["grid"]["version"]
-    rows = [_row(version, *other) for other in others]
+    grid = shown.get("grid")
+    rows = [_row(grid["version"] if grid else "", *other) for other in others]
+    if not grid:  # the map says itself what is wrong
+        return {"robots": rows, "robots_note": ""}
     absent = [row for row in rows if row["state"] == "absent"]
     notes = [say("map_robot_note", name=row["name"], note=row["note"]) for row in absent]
     return {"robots": rows, "robots_note": joined(notes)}
@@ -57,9 +57,9 @@ def other_robots(
 def _row(version: str, robot: str, name: TextLike, position: RobotOnMap) -> dict[str, Any]:
     """`state` is live, old or absent; `label` stands at the robot on the map."""
     row = {"robot": robot, "name": name, "label": name, "state": "absent", "pose": None}
-    if position.version and position.version != version:
+    if version and position.version and position.version != version:
         return row | {"note": say("map_robot_elsewhere")}
-    if not position.version or position.pose is None:
+    if not version or not position.version or position.pose is None:
         return row | {"note": position.note}
     label = say("map_robot_age", name=name, age=position.age) if position.age else name
     state = "live" if position.state == "live" else "old"

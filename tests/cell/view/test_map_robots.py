@@ -106,7 +106,15 @@ def test_a_robot_without_a_map_is_left_out_and_named() -> None:
 def test_a_robot_whose_map_fails_does_not_harm_the_others() -> None:
     row, _ = on(map_of(), FAILED)
     assert (row["state"], row["note"]) == ("absent", english(FAILED["note"]))
-    assert other_robots(FAILED, [("r2", "Robot 2", robot_on_map(map_of()))])["robots"] == []
+    row, note = on(FAILED, map_of())
+    assert (row["state"], row["pose"], row["note"], note) == ("absent", None, "", "")
+
+
+def test_the_list_has_each_robot_while_the_map_has_not_come() -> None:
+    panel, robot = robot_with(robots="all")
+    robot.maps["map"].grid = None
+    row, note = on(shown(panel, robot), map_of())
+    assert (row["robot"], row["state"], row["pose"], note) == ("r2", "absent", None, "")
 
 
 def test_what_gets_old_or_is_gone_is_shown_at_once() -> None:
