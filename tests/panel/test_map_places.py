@@ -81,7 +81,29 @@ def test_a_command_needs_the_input_whose_parts_it_names() -> None:
 
 
 def test_a_place_and_a_command_with_it_are_good(tmp_path: Path) -> None:
-    assert faults(tmp_path, HALL, GOAL, go(pose="{goal.pose}"), place=[DOCK]) == {}
+    command = go(header={"frame_id": "{goal.frame}"}, pose="{goal.pose}")
+    assert faults(tmp_path, HALL, GOAL, command, place=[DOCK]) == {}
+
+
+@pytest.mark.parametrize("header", [{}, {"header": {"frame_id": "odom"}}, {"header": {}}])
+def test_a_pose_in_another_frame_than_its_map_is_a_mistake(tmp_path: Path, header: Any) -> None:
+    for pose in ("{goal.pose}", {"position": {"x": "{goal.x}"}}):
+        messages = faults(tmp_path, HALL, GOAL, go(**header, pose=pose))
+        assert list(messages) == ["page[0].widget[2].message.header.frame_id"]
+        assert 'must be "{goal.frame}"' in messages["page[0].widget[2].message.header.frame_id"]
+
+
+def test_the_header_nearest_to_a_pose_names_its_frame(tmp_path: Path) -> None:
+    header = {"frame_id": "{goal.frame}"}
+    poses = [{"header": header, "pose": "{goal.pose}"}, {"pose": "{goal.pose}"}]
+    path = go(header=header, poses=poses) | {"type": "nav_msgs/msg/Path"}
+    messages = faults(tmp_path, HALL, GOAL, path)
+    assert list(messages) == ["page[0].widget[2].message.poses[1].header.frame_id"]
+
+
+def test_a_message_without_a_frame_may_have_a_pose(tmp_path: Path) -> None:
+    pose = go(position={"x": "{goal.x}"}) | {"type": "geometry_msgs/msg/Pose"}
+    assert faults(tmp_path, HALL, GOAL, pose) == {}
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from app.panel.widgets.families import CheckContext, Input
 from app.ros.messages import Interfaces
 from app.system.errors import Fault, FieldError, InterfaceError
 
+GEOMETRY: Final = frozenset({"x", "y", "yaw", "orientation", "pose"})  # parts of a place, on its map
 NOW_RULE: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
 ON_OTHER_PAGE: Final = " on this page: an input is read from the page it is on"
 
@@ -27,6 +28,7 @@ def template_faults(
             faults += _misplaced_now_faults(place, template, type_name, names, interfaces)
             known = {name: inputs[name] for name in used if name in inputs}
             faults += [] if faults else _encoding_faults(place, template, type_name, known, interfaces)
+            faults += [] if faults else _frame_faults(place, template, type_name, names, interfaces)
         yield from faults
     except FieldError as error:
         yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
@@ -90,6 +92,39 @@ def _misplaced_now_faults(
             kind = interfaces.field_type(type_name, where)
             if kind != TIME or value_at(template, where) != f"{{{NOW}}}":
                 yield Fault(f"{place}.{where}", f"{NOW_RULE}; the field is {kind}")
+
+
+def _frame_faults(
+    place: str,
+    template: Mapping[str, Any],
+    type_name: str,
+    names: list[tuple[str, str]],
+    interfaces: Interfaces,
+) -> Iterator[Fault]:
+    """Faults of a pose on a map in a message with another frame: the robot would take it for another
+    place."""
+    frames: dict[str, str] = {}  # the frame that a field has to have
+    for where, name in names:
+        input_id, _, part = name.partition(".")
+        field = _frame_field(type_name, where, interfaces) if part in GEOMETRY else None
+        if field is not None:
+            frames.setdefault(field, f"{{{input_id}.frame}}")
+    for field, frame in frames.items():
+        if value_at(template, field) != frame:
+            message = f'must be "{frame}": the pose is in the frame of its map'
+            yield Fault(f"{place}.{field}", message)
+
+
+def _frame_field(type_name: str, where: str, interfaces: Interfaces) -> str | None:
+    """The field with the frame of what is at a field: that of the nearest header around it."""
+    around = where
+    while around:
+        around = around.rpartition(".")[0]
+        field = f"{around}.header.frame_id".lstrip(".")
+        with suppress(InterfaceError):
+            interfaces.field_type(type_name, field)
+            return field
+    return None
 
 
 def _encoding_faults(
