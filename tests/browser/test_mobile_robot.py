@@ -94,3 +94,10 @@ def test_card_of_a_place_is_wholly_seen(shuttle: Server, page: Page, size: tuple
     )
     bottom = card["y"] + card["height"]
     assert [box["height"] >= 18 and box["y"] + box["height"] <= bottom for box in boxes] == [True] * 3
+
+
+def test_a_robot_at_a_place_is_over_its_symbol(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    marks = widget(page, "hall").locator(".map-marks > g")
+    names = marks.evaluate_all("(marks) => marks.map((mark) => mark.getAttribute('class'))")
+    assert names.index("map-places") < names.index("map-robot") < names.index("map-goal")

@@ -12,7 +12,7 @@ from typing import Any, Final
 from app.cell.permission.robot_pose import ShownPose, locate, map_doubt
 from app.cell.permission.verdict import Verdict, topic_mismatch
 from app.cell.robot.maps import Grid
-from app.cell.robot.places import floor_at, keep_out_at
+from app.cell.robot.places import floor_at
 from app.cell.robot.state import RobotState
 from app.cell.robot.transforms import Pose
 from app.panel.places import Place
@@ -80,6 +80,12 @@ def places_verdict(command: str, robot: RobotState, now: float) -> Verdict | Non
     return min(verdicts, key=lambda verdict: (verdict.permitted, verdict.until)) if verdicts else None
 
 
+def map_versions(command: str, robot: RobotState) -> str:
+    """The maps of the places that a command sends: it may be sent while the operator sees these."""
+    grids = (current_map(widget, robot) for widget in robot.place_inputs[command])
+    return " ".join(grid.version for grid in grids if isinstance(grid, Grid))
+
+
 def input_verdict(widget: PlaceInput, robot: RobotState, now: float) -> Verdict:
     """The lock that does not depend on the choice: the map or the robot's pose is not known now."""
     grid = current_map(widget, robot)
@@ -111,6 +117,8 @@ def current_map(widget: PlaceInput, robot: RobotState) -> Grid | TextLike:
         return state.problem
     if state.grid is None:
         return say("map_waiting")
+    if not state.grid.geometry.frame:
+        return say("map_no_frame")
     return map_doubt(state, robot) or state.grid
 
 
@@ -164,7 +172,7 @@ def _floor_refusal(widget: PlaceInput, pose: Pose, grid: Grid, robot: RobotState
     floor = floor_at(grid, pose.x, pose.y, radius)
     if floor == "outside":
         return say("place_outside")
-    if zone := keep_out_at(robot.zones, grid.version, pose.x, pose.y, radius):
+    if zone := robot.keep_out.at(grid.version, pose.x, pose.y, radius):
         return say("place_in_zone", zone=zone.label)
     return "" if floor == "free" else say(FLOOR_CODES[floor], radius=number(f"{radius:g}", "m"))
 
@@ -177,6 +185,8 @@ def goal_of(widget: PlaceInput, value: Any, robot: RobotState, now: float) -> Go
         return verdict.reason or ""
     if choice.refusal:
         return choice.refusal
+    if robot.maps[robot.key(map_of(widget, robot).topic)].is_behind:
+        return say("place_map_behind")
     grid = current_map(widget, robot)
     if not isinstance(grid, Grid):
         return _no_map(grid)

@@ -56,7 +56,7 @@ def _by_topic(
     reading = robot.reading(source.topic)
     if reading.fields is None:
         return ShownPose(None, say("map_pose_waiting"))
-    x, y, yaw, frame = (reading.value(path) for path in source.paths)
+    x, y, yaw, frame, age_s = (reading.value(path) for path in source.paths)
     if str(frame).lstrip("/") != geometry.frame:
         return ShownPose(None, say("map_pose_frame", frame=frame, map=geometry.frame))
     if yaw is None or not all(map(math.isfinite, (x, y, yaw))):
@@ -65,7 +65,8 @@ def _by_topic(
         return ShownPose(None, say("readout_foreign", time=format_time(reading.wall)))
     if reading.status in ("cut", "ended"):
         return _old(Pose(x, y, yaw), reading.at, now)
-    return _dated(Pose(x, y, yaw), reading.at, widget.max_age_s, now)
+    # A node repeats its last pose for a subscriber that comes later: by arrival that looks new.
+    return _dated(Pose(x, y, yaw), reading.at - (age_s or 0.0), widget.max_age_s, now)
 
 
 def _dated(pose: Pose, at: float, max_age_s: float, now: float) -> ShownPose:

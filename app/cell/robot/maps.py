@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 TILE: Final = 512  # cells a side
 MAX_CELLS: Final = 64_000_000  # 8000 x 8000
+COMPARED: Final = 2_000_000  # bytes of a message that are compared on the event loop: a millisecond
+FRAME_AT: Final = 12  # in a message: after the encapsulation and the stamp
+TIME_BYTES: Final = 8
 OCCUPIED: Final = 65  # percent and more, as Nav2's map server has it
 FREE: Final = 25  # percent and less
 MAX_OVERVIEW: Final = 1_000  # pixels a side of the picture of the whole map
@@ -81,11 +84,13 @@ class Geometry(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
     """A map: `cells` row by row from its origin, a byte each, with -1 as 255. Maps with the same
-    `digest` are the same."""
+    `digest` are the same. `head` is what its message has before the cells, without times; b"" after
+    updates."""
 
     geometry: Geometry
     cells: memoryview
     digest: str
+    head: bytes = b""
     floors: dict[tuple[float, float, float], Any] = field(default_factory=dict)  # see `floor_at`
 
     @property
@@ -127,9 +132,11 @@ class Arrival:
 @dataclass(slots=True)
 class MapState(Arrival):
     """The newest map of a topic. `updated_at` (monotonic seconds) is when its newest update arrived,
-    `doubt` why cells may not be the robot's of now although the map is: updates were lost."""
+    `doubt` why cells may not be the robot's of now although the map is: updates were lost. `is_behind`:
+    a newer map has arrived and is not read yet."""
 
     grid: Grid | None = None
+    is_behind: bool = False
     updated_at: float = -math.inf
     doubt: TextLike = ""
 
@@ -154,13 +161,31 @@ def read_grid(interfaces: Interfaces, payload: bytes) -> Grid:
     if origin is None:
         raise NoMap(say("map_origin"))
     geometry = Geometry(message.header.frame_id.lstrip("/"), width, height, float(resolution), origin)
-    return _grid_of(geometry, memoryview(message.data).cast("B"))
+    return _grid_of(geometry, memoryview(message.data).cast("B"), _head(payload, width * height))
 
 
-def _grid_of(geometry: Geometry, cells: memoryview) -> Grid:
+def _grid_of(geometry: Geometry, cells: memoryview, head: bytes = b"") -> Grid:
     digest = hashlib.sha256(repr(geometry).encode())
     digest.update(cells)
-    return Grid(geometry, cells, digest.hexdigest())
+    return Grid(geometry, cells, digest.hexdigest(), head)
+
+
+def is_repeated(grid: Grid | None, payload: bytes) -> bool:
+    """Whether a message is this map again, at any time."""
+    if grid is None or not grid.head:
+        return False
+    cells = len(grid.cells)
+    if len(payload) <= cells + FRAME_AT:
+        return False
+    return _head(payload, cells) == grid.head and payload[-cells:] == bytes(grid.cells)
+
+
+def _head(payload: bytes, cells: int) -> bytes:
+    """What the message of a map has before its cells, without its stamp and the time of its loading."""
+    size = int.from_bytes(payload[FRAME_AT : FRAME_AT + 4], "little" if payload[1] & 1 else "big")
+    loaded_at = FRAME_AT + 4 + size
+    loaded_at += -loaded_at % 4
+    return payload[FRAME_AT:loaded_at] + payload[loaded_at + TIME_BYTES : -cells]
 
 
 def updated(interfaces: Interfaces, grid: Grid, payloads: Iterable[bytes]) -> tuple[Grid, TextLike]:

@@ -4,15 +4,16 @@ Metres and radians in the map's frame.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, Literal
 
 from app.cell.robot.maps import COLOURS, FREE_COLOUR, OCCUPIED_COLOUR, Grid
 from app.panel.places import Zone
+from app.system.limits import BoundedDict
 
 Floor = Literal["outside", "occupied", "unknown", "free"]
 MAX_ROWS: Final = 400  # of cells that are looked at: a millisecond, however small the cells
-MAX_KEPT: Final = 2_000  # floors of one map
+MAX_KEPT: Final = 2_000  # floors of one map, and circles with the zones that they touch
 
 
 def floor_at(grid: Grid, x: float, y: float, radius: float) -> Floor:
@@ -56,14 +57,35 @@ def _cell(grid: Grid, x: float, y: float) -> tuple[float, float]:
     return (cos * dx + sin * dy) / size, (cos * dy - sin * dx) / size
 
 
-def keep_out_at(zones: Iterable[Zone], version: str, x: float, y: float, radius: float) -> Zone | None:
-    """The first keep-out zone of the map with this version that a circle touches."""
-    for zone in zones:
-        if zone.kind != "keep_out" or zone.map_version not in (None, version):
-            continue
-        if _is_in(zone, x, y) or any(_distance(ring, x, y) < radius for ring in zone.rings):
-            return zone
-    return None
+class KeepOut:
+    """The keep-out zones of one robot. Which of them a circle touches is kept: each view asks it of
+    each place, and 50 places with 20 zones took 60 ms."""
+
+    def __init__(self, zones: Iterable[Zone]) -> None:
+        self._zones = [(_box(zone.rings), zone) for zone in zones if zone.kind == "keep_out"]
+        self._touched = BoundedDict[tuple[float, float, float], tuple[Zone, ...]](MAX_KEPT)
+
+    def at(self, version: str, x: float, y: float, radius: float) -> Zone | None:
+        """The first zone of the map with this version that a circle touches."""
+        circle = x, y, radius
+        touched = self._touched.get(circle)
+        if touched is None:
+            touched = self._touched[circle] = tuple(self._touching(x, y, radius))
+        return next((zone for zone in touched if zone.map_version in (None, version)), None)
+
+    def _touching(self, x: float, y: float, radius: float) -> Iterator[Zone]:
+        for (left, bottom, right, top), zone in self._zones:
+            if not (left - radius <= x <= right + radius and bottom - radius <= y <= top + radius):
+                continue
+            if _is_in(zone, x, y) or any(_distance(ring, x, y) < radius for ring in zone.rings):
+                yield zone
+
+
+def _box(rings: Iterable[Sequence[tuple[float, float]]]) -> tuple[float, float, float, float]:
+    """(left, bottom, right, top) around polygons."""
+    corners = [corner for ring in rings for corner in ring]
+    xs, ys = [x for x, _ in corners], [y for _, y in corners]
+    return min(xs), min(ys), max(xs), max(ys)
 
 
 def _is_in(zone: Zone, x: float, y: float) -> bool:

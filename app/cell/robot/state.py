@@ -21,6 +21,7 @@ from app.cell.robot.map_layers import LayerState
 from app.cell.robot.maps import MapState
 from app.cell.robot.option_list import OptionList
 from app.cell.robot.parameter_state import ParameterState
+from app.cell.robot.places import KeepOut
 from app.cell.robot.publishers import (
     Publishers,
     ReplayedMessages,
@@ -149,6 +150,7 @@ class RobotState:
         self.map_layers = {self.key(topic): LayerState() for topic in panel.map_shapes}
         self.transforms = TransformTree()
         self.places, self.zones, self.map_views = panel.places, panel.zones, panel.map_views
+        self.keep_out = KeepOut(panel.zones)
         self.place_inputs = places_by_command(panel)
         self.history = History(time.monotonic(), time.time())
 

@@ -183,6 +183,7 @@ class TransformTree:
     def __init__(self) -> None:
         self._frames: dict[str, _Frame] = {}
         self._cut_at = math.inf
+        self._newest_at = -math.inf  # when the newest transform arrived
         self.is_full = False  # more frames came than have room
         # By the child's name: what is wrong with its transforms, and when the newest such came.
         self._problems = BoundedDict[str, tuple[TextLike, float]](MAX_FRAMES)
@@ -230,6 +231,10 @@ class TransformTree:
             return self._missing(base, fixed, ups, downs)
         path = [*_until(ups, common), *_until(downs, common)]
         cut = [name for name in path if self._frames[name].is_cut]
+        for name in path:  # two senders that disagree: which is right is not known
+            problem, at = self._problems.get(name, ("", -math.inf))
+            if at > self._newest_at - PROBLEM_S:
+                return problem
         if 0 < len(cut) < len(path):  # the others are of another run of the robot
             return say("transform_unknown", base=base, fixed=fixed, name=cut[0])
         moving = [frame for frame in (self._frames[name] for name in path) if frame.static is None]
@@ -249,6 +254,7 @@ class TransformTree:
 
     def _record(self, received: StampedTransform, at: float, is_static: bool) -> None:
         parent, child = _name(received.parent), _name(received.child)
+        self._newest_at = at
         turned = _rotation(received.turned)
         if not parent or not child or parent == child:
             self._problems[child] = say("transform_no_frame", child=child, parent=parent), at

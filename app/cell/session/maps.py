@@ -10,7 +10,7 @@ from typing import Final
 
 from app.cell.link.peer import RobotContext
 from app.cell.robot.map_layers import read_shape
-from app.cell.robot.maps import MapState, NoMap, read_grid, updated
+from app.cell.robot.maps import COMPARED, MapState, NoMap, is_repeated, read_grid, updated
 from app.cell.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.cell.robot.transforms import TF, TF_STATIC
 from app.panel.widgets.map_layers import updates_of
@@ -79,7 +79,14 @@ class MapListener:
     def take_map(self, key: str, sample: Sample) -> None:
         """A map or a layer; the one before it is not read if it waits."""
         self._newest[key] = sample
+        if (state := self._robot.maps.get(key)) is not None:
+            state.is_behind = not self._is_repeated(state, sample)
         self._begin(key)
+
+    @staticmethod
+    def _is_repeated(state: MapState, sample: Sample) -> bool:
+        """Whether a sample is the map that was read last. A large one is not copied to find out."""
+        return len(sample.payload) < COMPARED and is_repeated(state.grid, bytes(sample.payload))
 
     def _take_update(self, key: str, sample: Sample) -> None:
         """An update of a map: all count that came after it."""
@@ -106,6 +113,7 @@ class MapListener:
                     pause_s = LAYER_PAUSE_S
                 else:
                     await self._read_map(key)
+                    self._robot.maps[key].is_behind = key in self._newest
                     grid = self._robot.maps[key].grid
                     tiles = grid.columns * grid.rows if grid is not None else 0
                     pause_s = max(PAUSE_S, tiles / TILES_PER_S)

@@ -6,7 +6,7 @@ Data flow: the inbox wakes the event loop → `Turn` → robot, holds, confirmat
 import asyncio
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -492,7 +492,21 @@ def _map_listeners(context: RobotContext) -> "Iterator[MapListener]":
     if context.robot.maps:
         from app.cell.session.maps import MapListener
 
-        yield MapListener(context, context.signals.entries_decoded.emit)
+        yield MapListener(context, _map_listening(context))
+
+
+def _map_listening(context: RobotContext) -> Callable[[str], None]:
+    """Takes the key of a map or layer that was read: what it shows is shown, and what depends on a map
+    with places is judged again."""
+    robot, signals = context.robot, context.signals
+    of_places = {robot.key(robot.map_views[each.map].topic) for each in context.panel.place_inputs}
+
+    def changed(key: str) -> None:
+        signals.entries_decoded.emit(key)
+        if key in of_places:
+            signals.changed.emit()
+
+    return changed
 
 
 def _trend_recorders(context: RobotContext) -> "Iterator[TrendRecorder]":

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Final, TypedDict
 
+from app.cell.permission.goal_places import map_versions
 from app.cell.permission.verdict import PERMITTED, Verdict
 from app.cell.robot.state import RobotState
 from app.cell.view.conditions import conditions, machine_state, sequence
@@ -85,10 +86,13 @@ def attributes_of(
     widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict = PERMITTED
 ) -> AttributesUntil:
     """The attributes of a widget at `now` (monotonic seconds), and when time alone changes them;
-    `verdict` is that of a command, whose own deadline is not counted here. A value that alarms are
-    about has `alarmed`, the priority of the most urgent active one, "" for none."""
+    `verdict` is that of a command, whose own deadline is not counted here. A command that sends a place
+    has `map_versions`. A value that alarms are about has `alarmed`, the priority of the most urgent
+    active one, "" for none."""
     if isinstance(widget, Command):
         attributes, until = find_row(COMMANDS, widget)(widget, robot, verdict, now)
+        if widget.id in robot.place_inputs:
+            attributes = {**attributes, "map_versions": map_versions(widget.id, robot)}
     else:
         attributes, until = find_row(ATTRIBUTES, widget)(widget, robot, now)
     if isinstance(widget, Display):

@@ -140,6 +140,8 @@ def beat(language: str = ENGLISH) -> bytes:
 Events = dict[str, Mapping[str, Any]]  # event name → its data, in the order of sending
 
 NO_VALUES: Final[Mapping[str, Any]] = {}
+# Attributes of a command: a press of a page that shows others is outdated.
+JUDGED_BY: Final = frozenset({"enabled", "map_versions"})
 # Events with what has changed since the last one that a stream sent, not with whole sections.
 CHANGES: Final = frozenset({"update", "updates", "alarms"})
 PERMISSION_EVENT: Final = "-enabled-updated"  # appended to an interlock's id; for programs
@@ -337,7 +339,7 @@ class ViewPublisher:
         self.shared = shared
         self.version += 1
         for widget, changed in events.get("update", {}).items():
-            if "enabled" in changed:
+            if not JUDGED_BY.isdisjoint(changed):
                 self._lock_changes[widget] = self.version
         self.view, self._latest_events, self._without_control = view, events, without_control
         self._views, self._snapshots, self._prepared, self._whole = {}, {}, {}, {}
@@ -345,7 +347,8 @@ class ViewPublisher:
         self._wake()
 
     def lock_changed_at(self, widget: str) -> int:
-        """The version in which a widget's lock has last closed or opened; 0 if it never has."""
+        """The version in which a widget's lock has last closed or opened, or the map of its places was
+        another one; 0 if it never has."""
         return self._lock_changes.get(widget, 0)
 
     def renew_audiences(self) -> None:

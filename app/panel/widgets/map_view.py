@@ -32,6 +32,7 @@ POSE_PATHS: Final = {
     "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose",
     "nav_msgs/msg/Odometry": "pose.pose",
 }
+AGE: Final = "age(header.stamp)"
 TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
 
 
@@ -45,11 +46,12 @@ class PoseTopic(TopicKeys):
     ] = "geometry_msgs/msg/PoseWithCovarianceStamped"
 
     @property
-    def paths(self) -> tuple[str, str, str, str]:
-        """The fields of x and y (metres), heading (radians) and the frame."""
+    def paths(self) -> tuple[str, str, str, str, str]:
+        """The fields of x and y (metres), heading (radians), the frame, and how old the pose was when
+        it arrived (seconds)."""
         pose = POSE_PATHS[self.type]
         place = f"{pose}.position"
-        return f"{place}.x", f"{place}.y", f"yaw({pose}.orientation)", "header.frame_id"
+        return f"{place}.x", f"{place}.y", f"yaw({pose}.orientation)", "header.frame_id", AGE
 
 
 class MapRoutes(Description):

@@ -12,10 +12,12 @@ const RING_PX = 17;
 const ARROW_PX = 46;
 const PHONE = matchMedia("(max-width: 599px)"); // it only shows
 
-/** @param {HTMLElement} map @param {string} name */
-function layer(map, name) {
+// Over what the map has, or under the mark `above`.
+/** @param {HTMLElement} map @param {string} name @param {string} [above] */
+function layer(map, name, above) {
   const made = svgElement("g", { class: name });
-  map.querySelector("svg.map-marks")?.append(made);
+  const marks = map.querySelector("svg.map-marks");
+  marks?.insertBefore(made, above ? marks.querySelector(above) : null);
   return made;
 }
 
@@ -31,7 +33,7 @@ export class Places {
   /** @param {HTMLElement} map @param {MapView} view @param {(id: string) => void} choose */
   constructor(map, view, choose) {
     this.#view = view;
-    this.#layer = layer(map, "map-places");
+    this.#layer = layer(map, "map-places", ".map-robot"); // a robot that is at a place is seen
     view.onDraw(() => this.#draw());
     view.onPointer((event) => {
       const id = this.#met(event);

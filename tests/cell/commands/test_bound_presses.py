@@ -4,6 +4,7 @@ import json
 import signal
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -20,6 +21,7 @@ from app.records import NullLog
 from app.system import clock
 from app.system.errors import InputError
 from app.system.texts import Text, say
+from tests.cell.permission.test_goal_places import cell_with, put_map
 from tests.support.builders import (
     NOW,
     PROGRAM,
@@ -196,6 +198,24 @@ def test_a_press_of_a_page_that_showed_the_lock_before_it_changed_is_stale() -> 
     assert reason("guarded", seen) == "press_state_changed"
     assert reason("free", seen) == ""
     assert reason("guarded", publisher.id) == ""
+
+
+def test_a_place_is_not_sent_from_a_view_with_another_map() -> None:
+    panel, robot, _, _ = cell_with()
+    publisher = ViewPublisher(build_view(panel, robot, NOW).view, "r1")
+    guard = PressGuard(
+        publisher,
+        ControlAuthority(panel.control, "", log_line=lambda *_: None),
+        NullLog(),
+        3.0,
+        lambda: (),
+    )
+    press = press_of(panel.commands[0], {}, seen=publisher.id)
+    put_map(robot, resolution=0.3)
+    publisher.post(build_view(panel, robot, NOW).view)
+    assert publisher.view["widgets"]["drive"]["enabled"]
+    assert guard.stale_reason(press) == say("press_state_changed")
+    assert guard.stale_reason(replace(press, seen=publisher.id)) == ""
 
 
 @pytest.mark.parametrize("seen", ["", f"{VIEW}-0", "0123-99"])

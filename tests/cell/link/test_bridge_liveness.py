@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any
 
 import pytest
@@ -189,6 +190,27 @@ def test_silence_is_reported_and_its_end() -> None:
         assert changes == [False, True]
 
     run(test)
+
+
+def test_a_robot_that_hangs_does_not_delay_the_questions_to_others() -> None:
+    async def benched() -> None:
+        lines, robots = (Line(), Line()), (robot_there(small_panel()), robot_there(small_panel()))
+        changes: list[int] = []
+        asked = [
+            BridgeLiveness(robot, line, partial(changes.append, number))
+            for number, (robot, line) in enumerate(zip(robots, lines, strict=True))
+        ]
+        lines[0].answers = False
+        for each in asked:
+            each.start()
+        await when(lambda: not robots[0].is_responding)
+        count = len(lines[1].queries)
+        await when(lambda: len(lines[1].queries) > count + 5)
+        assert (robots[1].is_responding, changes) == (True, [0])
+        for each in asked:
+            await each.stop()
+
+    asyncio.run(benched())
 
 
 def test_reply_of_another_bridge_does_not_end_the_silence() -> None:

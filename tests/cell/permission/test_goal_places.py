@@ -12,10 +12,11 @@ from app.cell.robot.state import RobotState
 from app.cell.robot.transforms import Pose
 from app.panel.model import Panel
 from app.panel.widgets.place import PlaceInput
+from app.ros.zenoh.sample import Sample
 from app.system.errors import InputError
 from app.system.texts import Text, TextLike
-from tests.cell.view.test_map_values import moved
-from tests.support.builders import INTERFACES, NOW, panel_of, robot_there
+from tests.cell.view.test_map_values import POSE_TYPE, moved
+from tests.support.builders import BRIDGE, INTERFACES, NOW, panel_of, robot_there
 
 pytestmark = pytest.mark.promise("places")
 
@@ -44,12 +45,17 @@ ZONES: Final = [
 ]
 
 
-def message(unknown: bool = False) -> dict[str, Any]:
+def message(unknown: bool = False, frame: str = "map", resolution: float = 0.25) -> dict[str, Any]:
     cells = [
         100 if column >= 32 else -1 if unknown else 0 for _ in range(SIZE) for column in range(SIZE)
     ]
-    info = {"width": SIZE, "height": SIZE, "resolution": 0.25, "origin": {"orientation": {"w": 1.0}}}
-    return {"header": {"frame_id": "map"}, "info": info, "data": cells}
+    info = {
+        "width": SIZE,
+        "height": SIZE,
+        "resolution": resolution,
+        "origin": {"orientation": {"w": 1.0}},
+    }
+    return {"header": {"frame_id": frame}, "info": info, "data": cells}
 
 
 def put_map(robot: RobotState, **about: Any) -> str:
@@ -190,6 +196,11 @@ def unreadable(robot: RobotState) -> float:
     return NOW
 
 
+def no_frame(robot: RobotState) -> float:
+    put_map(robot, frame="")
+    return NOW
+
+
 def map_cut(robot: RobotState) -> float:
     robot.maps["map"].cut_at = NOW + 1
     return NOW
@@ -209,6 +220,7 @@ def pose_cut(robot: RobotState) -> float:
         (pose_cut, "place_pose_old", "place_pose_old"),
         (no_map, "place_no_map", "map_waiting"),
         (unreadable, "place_no_map", "map_empty"),
+        (no_frame, "place_no_map", "map_no_frame"),
         (map_cut, "place_no_map", "readout_before_disconnect"),
     ],
 )
@@ -225,6 +237,31 @@ def test_what_is_not_known_now_locks_the_button_and_refuses_each_choice(
     assert judged(button, (), robot, now).code == why
     for value in ("dock", touched(version)):
         assert code(sent(robot, widget, value, now)) == first
+
+
+def test_while_a_newer_map_is_not_read_yet_nothing_is_sent_and_nothing_flickers() -> None:
+    _, robot, widget, version = cell_with()
+    robot.maps["map"].is_behind = True
+    for value in ("dock", touched(version)):
+        assert code(sent(robot, widget, value)) == "place_map_behind"
+    verdict = places_verdict("drive", robot, NOW)
+    assert verdict is not None
+    assert verdict.permitted
+
+
+@pytest.mark.parametrize(("age_s", "why"), [(0, ""), (600, "place_pose_old")])
+def test_a_pose_that_a_node_repeats_for_a_later_subscriber_is_old(age_s: int, why: str) -> None:
+    panel = panel_of(HALL | {"pose": {"topic": "/amcl_pose"}}, GOAL, DRIVE, place=PLACES)
+    robot = robot_there(panel)
+    put_map(robot)
+    stamp = {"sec": int(NOW) - age_s}
+    pose = {
+        "header": {"frame_id": "map", "stamp": stamp},
+        "pose": {"pose": {"orientation": {"w": 1.0}}},
+    }
+    robot.update("amcl_pose", Sample(INTERFACES.encode(POSE_TYPE, pose), 1, NOW, NOW, BRIDGE))
+    goal = sent(robot, panel.place_inputs[0], "dock")
+    assert isinstance(goal, Goal) if not why else code(goal) == why
 
 
 def test_the_missing_frame_is_named() -> None:

@@ -13,6 +13,7 @@ from app.cell.robot.maps import (
     TILE,
     Grid,
     NoMap,
+    is_repeated,
     overview,
     read_grid,
     reduced,
@@ -177,3 +178,35 @@ def test_a_costmap_is_transparent_where_nothing_costs() -> None:
     opacity = [*pixels(tile(grid, 0, 0, "light", costs=True)).getchannel("A").tobytes()]
     assert opacity[:2] == [0, 0]
     assert 0 < opacity[2] < opacity[3] < opacity[4] == opacity[5] < 255
+
+
+def dated(frame: str, sec: int = 1, **more: Any) -> bytes:
+    info = {
+        "width": 2,
+        "height": 2,
+        "resolution": 0.5,
+        "origin": UPRIGHT,
+        "map_load_time": {"sec": sec},
+    }
+    header = {"frame_id": frame, "stamp": {"sec": sec}}
+    message = {"header": header, "info": info | more, "data": [0, 1, 2, 3]}
+    return INTERFACES.encode(GRID_TYPE, message)
+
+
+@pytest.mark.parametrize("frame", ["m", "ma", "map", "another_map"])
+def test_a_map_that_is_published_again_is_recognised_by_its_bytes(frame: str) -> None:
+    grid = read_grid(INTERFACES, dated(frame))
+    assert is_repeated(grid, dated(frame, sec=77))
+    for other in (
+        dated(frame + "x"),
+        dated(frame, resolution=0.6),
+        dated(frame, width=4, height=1),
+        dated(frame)[:-1] + b"\x04",
+        dated(frame)[:-1],
+        dated(frame)[:14],
+        b"\0\1\0\0" + b"\xff" * 40,
+        b"",
+    ):
+        assert not is_repeated(grid, other)
+    changed = updated(INTERFACES, grid, [])[0]
+    assert not is_repeated(changed, dated(frame))

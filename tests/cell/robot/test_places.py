@@ -5,8 +5,9 @@ from typing import Any, Final
 
 import pytest
 
+from app.cell.robot import places
 from app.cell.robot.maps import GRID_TYPE, Grid, read_grid
-from app.cell.robot.places import MAX_KEPT, floor_at, keep_out_at
+from app.cell.robot.places import MAX_KEPT, KeepOut, floor_at
 from app.panel.places import Zone
 from tests.support.builders import INTERFACES
 
@@ -99,7 +100,7 @@ def zone(**more: Any) -> Zone:
     ],
 )
 def test_a_circle_that_touches_a_keep_out_zone_is_in_it(x: float, y: float, is_in: bool) -> None:
-    assert (keep_out_at([zone()], "a" * 16, x, y, 0.3) is not None) == is_in
+    assert (KeepOut([zone()]).at("a" * 16, x, y, 0.3) is not None) == is_in
 
 
 @pytest.mark.parametrize(
@@ -114,10 +115,30 @@ def test_a_circle_that_touches_a_keep_out_zone_is_in_it(x: float, y: float, is_i
 def test_a_hole_is_not_of_the_zone(x: float, y: float, is_in: bool) -> None:
     square = [[0, 0], [3, 0], [3, 3], [0, 3]]
     with_hole = zone(points=square, holes=[[[1, 0.5], [2, 0.5], [2, 2], [1, 2]]])
-    assert (keep_out_at([with_hole], "a" * 16, x, y, 0.3) is not None) == is_in
+    assert (KeepOut([with_hole]).at("a" * 16, x, y, 0.3) is not None) == is_in
 
 
 def test_other_zones_and_those_of_other_maps_are_only_shown() -> None:
     others = [zone(kind="speed"), zone(kind="label"), zone(map_version="b" * 16)]
-    assert keep_out_at(others, "a" * 16, 1.0, 0.5, 0.3) is None
-    assert keep_out_at(others, "b" * 16, 1.0, 0.5, 0.3) is others[-1]
+    assert KeepOut(others).at("a" * 16, 1.0, 0.5, 0.3) is None
+    assert KeepOut(others).at("b" * 16, 1.0, 0.5, 0.3) is others[-1]
+
+
+def test_corners_are_looked_at_once_for_a_circle_and_only_of_zones_near_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked: list[Any] = []
+    contains = places._contains
+
+    def counted(points: Any, x: float, y: float) -> bool:
+        looked.append(points)
+        return contains(points, x, y)
+
+    monkeypatch.setattr(places, "_contains", counted)
+    far = [[100, 0], [104, 0], [104, 2]]
+    keep_out = KeepOut([zone(id="far", points=far), zone()])
+    for _ in range(3):
+        hit = keep_out.at("a" * 16, 1.0, 0.5, 0.3)
+        assert hit is not None
+        assert hit.id == "z"
+    assert len(looked) == 1

@@ -137,13 +137,19 @@ def test_a_transform_that_is_none_is_not_taken_and_named(bad: Any, expected: str
     assert code(tree_with(transform("map", "odom"), bad)) == expected
 
 
-def test_a_second_parent_is_named_where_the_way_is_lost() -> None:
+def test_a_frame_with_two_parents_is_not_located_for_a_while() -> None:
     tree = tree_with(
         transform("map", "odom"), transform("odom", "base_link"), transform("other", "base_link")
     )
     assert code(tree) == "transform_two_parents"
-    tree.record(Message(transforms=[transform("odom", "base_link", 2.0, x=3.0)]), 1.0, is_static=False)
-    assert located(tree).pose.x == 3.0
+    back = Message(transforms=[transform("odom", "base_link", 2.0, x=3.0)])
+    tree.record(back, 101.0, is_static=False)
+    assert code(tree) == "transform_two_parents"  # the way is there, but which parent is right?
+    assert code(tree, "base_link", "odom") == "transform_two_parents"
+    assert located(tree, "odom", "map").pose.x == 0.0
+    further = Message(transforms=[transform("odom", "base_link", 9.0, x=4.0)])
+    tree.record(further, 101.5 + PROBLEM_S, is_static=False)
+    assert located(tree).pose.x == 3.0  # at the newest common time
 
 
 def test_frames_and_times_are_bounded() -> None:

@@ -24,10 +24,12 @@ SIDE: Final = 4000
 MOST_HELD_S: Final = 0.05  # the event loop, by a map of 4000 x 4000
 
 
-def payload(value: int, side: int = 1) -> bytes:
+def payload(value: int, side: int = 1, sec: int = 0) -> bytes:
     info = {"width": side, "height": side, "resolution": 1.0, "origin": {"orientation": {"w": 1.0}}}
+    info["map_load_time"] = {"sec": sec}
     cells = [value] * (side * side)
-    return INTERFACES.encode(GRID_TYPE, {"header": {"frame_id": "map"}, "info": info, "data": cells})
+    header = {"frame_id": "map", "stamp": {"sec": sec}}
+    return INTERFACES.encode(GRID_TYPE, {"header": header, "info": info, "data": cells})
 
 
 def sample(data: bytes, seq: int = 1) -> Sample:
@@ -65,10 +67,14 @@ async def test_of_many_maps_the_first_and_the_newest_are_read(monkeypatch: pytes
     for value in range(50):
         listening.listener.take_map("map", sample(payload(value), value))
     await listening.reported(1)
-    first = listening.robot.maps["map"].grid
+    state = listening.robot.maps["map"]
+    first = state.grid
+    assert not state.is_behind
     for value in range(50, 101):
         listening.listener.take_map("map", sample(payload(value), value))
+        assert (state.grid, state.is_behind) == (first, True)
     await listening.reported(2)
+    assert not state.is_behind
     await asyncio.sleep(0.2)
     newest = listening.robot.maps["map"].grid
     assert first is not None
@@ -84,7 +90,8 @@ async def test_the_same_map_again_is_the_same_picture(monkeypatch: pytest.Monkey
     listening.listener.take_map("map", sample(payload(5)))
     await listening.reported(1)
     first = listening.robot.maps["map"].grid
-    listening.listener.take_map("map", sample(payload(5), 2))
+    listening.listener.take_map("map", sample(payload(5, sec=9), 2))
+    assert not listening.robot.maps["map"].is_behind
     await listening.reported(2)
     assert listening.robot.maps["map"].grid is first
 
