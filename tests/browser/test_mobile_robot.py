@@ -101,3 +101,16 @@ def test_a_robot_at_a_place_is_over_its_symbol(shuttle: Server, page: Page) -> N
     marks = widget(page, "hall").locator(".map-marks > g")
     names = marks.evaluate_all("(marks) => marks.map((mark) => mark.getAttribute('class'))")
     assert names.index("map-places") < names.index("map-robot") < names.index("map-goal")
+
+
+def test_symbols_of_places_stay_while_the_robot_drives(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    symbol = page.locator(".map-places > g").first
+    symbol.evaluate("(symbol) => { symbol.isFirst = true; }")
+    distance = widget(page, "goal").locator("[data-place=charger] .distance")
+    before = distance.inner_text()
+    send(page, "wrapper")
+    expect(distance).not_to_have_text(before)
+    assert symbol.evaluate("(symbol) => symbol.isFirst")
+    widget(page, "send").locator(".cancel").click()
+    expect(widget(page, "send")).to_contain_text("Canceled at")

@@ -45,7 +45,10 @@ export class Places {
 
   /** @param {Place[]} places @param {string} chosen */
   show(places, chosen) {
+    const isSame =
+      places.length === this.#places.length && places.every((place, at) => place.label === this.#places[at].label);
     [this.#places, this.#chosen] = [places, chosen];
+    if (isSame) return this.#draw(); // the robot drives: only distances differ
     this.#layer.replaceChildren(
       ...places.map(({ label }) => {
         const text = svgElement("text", { x: RING_PX - 2, dy: ".36em" });
