@@ -104,7 +104,7 @@ def test_a_widget_without_html_has_a_sentence_in_its_tile(
     page.goto(cell.url)
     expect(widget(page, "course")).to_contain_text(FAILURE)
     expect(widget(page, "course")).to_contain_text("Course")
-    expect(widget(page, "value")).to_contain_text("5")
+    expect(widget(page, "value").locator(".value")).to_have_text("5")
     go(page, node)
     assert cell.process.text.count("RuntimeError: this plot fails") == 1, "logged once"
 
@@ -117,14 +117,14 @@ def test_a_widget_without_attributes_is_unreadable_and_the_others_go_on(
     expect(widget(page, "pressure")).to_have_attribute("data-state", "live")
     for value in (95.0, 96.0, 97.0):
         node.publish("/test_part_pressure", {"data": value})
-        expect(widget(page, "value")).to_contain_text(f"{value:g}")
+        expect(widget(page, "value").locator(".value")).to_have_text(f"{value:g}")
     expect(widget(page, "pressure")).to_have_attribute("data-state", "unreadable")
     expect(widget(page, "pressure")).to_contain_text(FAILURE)
     go(page, node)
     page.reload()
     expect(widget(page, "pressure")).to_contain_text(FAILURE)
     node.publish("/test_part_pressure", {"data": 6.0})
-    expect(widget(page, "value")).to_contain_text("6")
+    expect(widget(page, "value").locator(".value")).to_have_text("6")
     assert cell.process.text.count("RuntimeError: this gauge fails") == 1
     page.reload()
     expect(widget(page, "pressure")).to_have_attribute("data-state", "live")
@@ -154,5 +154,5 @@ def test_a_widget_whose_script_throws_is_locked_in_its_tile(
         expect(widget(own_page, name)).to_have_attribute("data-state", "unreadable")
     expect(widget(own_page, name)).to_contain_text(FAILURE)
     node.publish("/test_part_pressure", {"data": 8.0})
-    expect(widget(own_page, "value")).to_contain_text("8")
+    expect(widget(own_page, "value").locator(".value")).to_have_text("8")
     go(own_page, node)
