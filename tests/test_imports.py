@@ -26,6 +26,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("permission",),
         ("people",),
         ("recipes",),
+        ("places",),
         ("alarms",),
         ("link",),
         ("view",),

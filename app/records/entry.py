@@ -29,6 +29,7 @@ Kind = Literal[
     "alarm",
     "diagnostics",
     "recipe",
+    "place",
     "access",
     "removed",
     "resumed",

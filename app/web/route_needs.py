@@ -63,6 +63,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/diagnostics/{act}": ANYBODY,
     "/recipes/{set}/{act}": ANYBODY,
     "/recipes/{set}/import": ANYBODY,
+    "/places/{widget}/{act}": ANYBODY,
     # What has been, and what the robot is asked.
     "/widgets/{widget}/read": OPERATOR,
     "/alarms/history": OPERATOR,
@@ -74,6 +75,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/recipes": OPERATOR,
     "/recipes/{set}": OPERATOR,
     "/recipes/{set}.csv": OPERATOR,
+    "/places/{widget}": OPERATOR,
     "/openapi.json": OPERATOR,
     "/metrics": LOCAL_ONLY,
     # For the engineer.

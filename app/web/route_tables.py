@@ -31,6 +31,7 @@ LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "control": ("control",),
     "alarms": ("alarms", "alarm_history", "alarm_report"),
     "recipes": ("recipes",),
+    "places": ("saved_places",),
     "diagnostics": ("diagnostics",),
     "recordings": ("recordings",),
     "help": ("help",),
@@ -47,7 +48,7 @@ DESCRIPTION: Final = "openapi.json"  # it describes all
 ROBOT_ROUTES: Final = frozenset(
     {
         *("pages", "events", "presses", "confirm", "control", "holds", "parameters", "frames"),
-        *("maps", "places", "widget_data", "lock_help", "recipes"),
+        *("maps", "places", "widget_data", "lock_help", "recipes", "saved_places"),
     }
 )
 PAGE: Final = ("widgets", "presses", "control", "display", "help")  # what a page itself requests
@@ -107,6 +108,8 @@ def _used(panel: Panel) -> Iterator[str]:
         yield "alarms"
     if panel.recipes:
         yield "recipes"
+    if any(widget.save for widget in panel.place_inputs):
+        yield "places"
     if panel.access.oidc is not None:
         yield "signin"
 

@@ -144,6 +144,7 @@ OFFERED: Final[Table] = {
 }
 PLACES: Final = (
     Example("places", "place", PLACE, {"state": "live", "note": ""} | OFFERED),
+    Example("saved", "place", PLACE | {"save": True}, {"state": "live", "note": ""} | OFFERED),
     Example(
         "locked",
         "place",

@@ -15,6 +15,7 @@ import pytest
 from app.cell.commands.alarm_acts import ALARM_ACTS
 from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.place_acts import PLACE_ACTS
 from app.cell.commands.recipe_acts import RECIPE_ACTS
 from app.cell.commands.shift_acts import SHIFT_ACTS
 from app.cell.commands.user_acts import USER_ACTS
@@ -37,11 +38,28 @@ required = true
 [record]
 topics = ["/air"]
 """
+HALL: Final = """
+[[page]]
+id = "drive"
+title = "Drive"
+[[page.widget]]
+id = "hall"
+kind = "map"
+label = "Hall"
+[[page.widget]]
+id = "goal"
+kind = "place"
+label = "Places"
+map = "hall"
+touch = true
+save = true
+"""
 PATIENT: Final = "tests.support.apps.patient:app"
 PIN: Final = "2580"
 SECRET: Final = "7391"
 RECIPE: Final = {**CARTON, "speed": 82.5}
 CSV: Final = "name,length,speed,gripper,fast,note\nTray,600,80,fork,true,x\n"
+POSE: Final = "x=1.50 y=1.00 yaw=1.57 map={map}"
 COMPARED: Final = ("kind", "who", "action", "values", "outcome", "reason", "text")
 BY_TIME: Final = {action for action, *_ in HAND_OVERS.values()}  # entries of no act
 A_TIME: Final = r"\d{4}-\d\d-\d\d[T ][\d:.+]+|\d\d:\d\d(:\d\d)?"
@@ -122,6 +140,10 @@ ROWS: Final = (
     _edit("import", csv=CSV),
     _edit("import", "between_sentences", csv="name\n"),
     _edit("delete", recipe="second", version=2),
+    Row("/places/goal/save", {"name": "Bay", "value": POSE}),
+    Row("/places/goal/save", {"name": "bay", "value": POSE}, code="place_name_taken"),
+    Row("/places/goal/delete", {"place": "bay"}),
+    Row("/places/goal/delete", {"place": "bay"}, code="saved_place_gone"),
 )  # fmt: skip
 
 
@@ -137,9 +159,13 @@ def cell(folder: Path) -> Server:
     data.mkdir(mode=0o700)
     add_user(data, "Sato", "engineer", pin=PIN)
     add_user(data, "Mori", "viewer", pin=PIN)
-    panel = panel_file(folder, PANEL + ALARM)
+    panel = panel_file(folder, PANEL + ALARM + HALL)
     more: Any = {"KIOSK_DATA": str(data), "KIOSK_PANEL": str(panel), "KIOSK_MODE": "demo"}
     return ready(Server(ROOT, app=PATIENT, **more))
+
+
+def _is_on_the_map(server: Server) -> bool:
+    return bool(server.widget("hall")["state"] == "live")
 
 
 def _is_raised(server: Server) -> bool:
@@ -155,6 +181,7 @@ def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, Se
     ):
         for server in (first, second):
             until(partial(_is_raised, server), "the alarm is raised")
+            until(partial(_is_on_the_map, server), "the robot is on the map")
         yield first, second
 
 
@@ -171,7 +198,10 @@ def sent_by(
     """What came of all rows, and the entries of the log; `name` begins the ids."""
     send, before = _by_form if as_form else _by_json, len(log_rows(log))
     answers = []
+    version = _map_version(log)
     for place, row in enumerate(ROWS):
+        if row.body.get("value") == POSE:
+            row = row._replace(body={**row.body, "value": POSE.format(map=version)})
         client.post("/control/here", json={"touched": True}).raise_for_status()
         answers.append(send(row, client, f"{name}-{place}"))
     entries = [
@@ -180,6 +210,13 @@ def sent_by(
         if entry["action"] not in BY_TIME
     ]
     return answers, entries
+
+
+def _map_version(client: httpx.Client) -> str:
+    page = client.get("/places/goal", params={"mode": "save"}).text
+    version = re.search(r'name="map" value="([0-9a-f]{16})"', page)
+    assert version, page
+    return version[1]
 
 
 def _by_json(row: Row, client: httpx.Client, act_id: str) -> Sent:
@@ -216,6 +253,7 @@ def test_all_acts_are_here() -> None:
         "diagnostics": DIAGNOSTIC_ACTS,
         "users": USER_ACTS,
         "recipes": RECIPE_ACTS,
+        "places": PLACE_ACTS,
     }
     assert {(room, act) for room, acts in tables.items() for act in acts} <= named
     assert ([*SHIFT_ACTS], ("alarms", "report") in named) == (["message"], True)

@@ -17,6 +17,7 @@ from tests.cell.recipes.panels import PANEL
 from tests.support.parts import ROOT, Server
 from tests.support.servers import panel_file, ready
 from tests.support.users import Browsers, add_user
+from tests.web.test_acts_by_form import HALL
 
 MORE: Final = """
 [access]
@@ -50,6 +51,7 @@ PAGES: Final = {
     "/diagnostics": ("/diagnostics", 200),
     "/help": ("/help", 200),
     "/log": ("/log", 200),
+    "/places/{widget}": ("/places/goal", 200),
     "/recipes/{set}": ("/recipes/boxes", 200),
     "/signin": ("/signin", 200),
     "/users": ("/users", 200),
@@ -71,7 +73,7 @@ def signed_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client
     data = folder / "data"
     data.mkdir(mode=0o700)
     add_user(data, "Sato", "engineer", pin=PIN)
-    panel = panel_file(folder, PANEL + MORE)
+    panel = panel_file(folder, PANEL + MORE + HALL)
     browsers = Browsers()
     with ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_PANEL=str(panel), KIOSK_MODE="demo")) as server:
         yield browsers.signed_in(server.url, "Sato", pin=PIN)

@@ -41,6 +41,15 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
+class MapPoint:
+    """A pose on the map with this version, in its frame."""
+
+    pose: Pose
+    frame: str
+    version: str
+
+
+@dataclass(frozen=True, slots=True)
 class Goal:
     """What is sent: a pose in the map's frame. `name` is what a receipt calls it."""
 
@@ -65,12 +74,15 @@ def radius_of(widget: PlaceInput, robot: RobotState) -> float:
 
 
 def places_of(widget: PlaceInput, robot: RobotState) -> Iterator[Place]:
-    """The places that may be chosen: those of the file, in its order or that of the input."""
+    """The places that may be chosen: those of the file, in its order or that of the input, then those
+    that were saved. An id of the file counts before that of a saved place."""
+    known = {str(place.id): place for place in robot.places}
     if widget.places is None:
         yield from robot.places
-        return
-    known = {str(place.id): place for place in robot.places}
-    yield from (known[name] for name in widget.places if name in known)
+    else:
+        yield from (known[name] for name in widget.places if name in known)
+    if widget.places is None or widget.save:
+        yield from (place for place in robot.saved_places if place.id not in known)
 
 
 def places_verdict(command: str, robot: RobotState, now: float) -> Verdict | None:
@@ -86,12 +98,16 @@ def map_versions(command: str, robot: RobotState) -> str:
     return " ".join(grid.version for grid in grids if isinstance(grid, Grid))
 
 
-def input_verdict(widget: PlaceInput, robot: RobotState, now: float) -> Verdict:
-    """The lock that does not depend on the choice: the map or the robot's pose is not known now."""
+def input_verdict(
+    widget: PlaceInput, robot: RobotState, now: float, require_pose: bool | None = None
+) -> Verdict:
+    """The lock that does not depend on the choice: the map or, by default if the input requires it, the
+    robot's pose is not known now."""
+    require_pose = widget.require_pose if require_pose is None else require_pose
     grid = current_map(widget, robot)
     if not isinstance(grid, Grid):
         return Verdict(False, "place_no_map", _no_map(grid), now + RECHECK_S)
-    if not widget.require_pose:
+    if not require_pose:
         return Verdict(True, until=now + RECHECK_S)
     shown = locate(map_of(widget, robot), robot, grid.geometry, now)
     until = min(shown.until, now + RECHECK_S)
@@ -191,6 +207,31 @@ def goal_of(widget: PlaceInput, value: Any, robot: RobotState, now: float) -> Go
     if not isinstance(grid, Grid):
         return _no_map(grid)
     return Goal(choice.pose, grid.geometry.frame, name_of(choice))
+
+
+def point_to_save(
+    widget: PlaceInput, value: str, version: str, robot: RobotState, now: float
+) -> MapPoint | TextLike:
+    """The pose that a place is saved of, or why there is none: of a touched pose by the rule for goals
+    without that for the robot's pose; for "" where the robot is now. `version` is that of the map that
+    the screen showed. InputError for a value that is no touched pose."""
+    choice = choice_of(widget, value, robot) if value else None
+    if choice is not None and choice.place is not None:
+        raise InputError("value must be a pose that was touched on the map, not the id of a place")
+    verdict = input_verdict(widget, robot, now, require_pose=choice is None)
+    if not verdict.permitted:
+        return verdict.reason or ""
+    grid = current_map(widget, robot)
+    if not isinstance(grid, Grid):
+        return _no_map(grid)
+    if choice is not None and choice.refusal:
+        return choice.refusal
+    if version not in ("", grid.version):
+        return say("place_map_changed")
+    pose = choice.pose if choice is not None else robot_pose(widget, robot, now).pose
+    if pose is None:
+        return say("place_pose_unknown")
+    return MapPoint(pose, grid.geometry.frame, grid.version)
 
 
 def name_of(choice: Choice) -> TextLike:

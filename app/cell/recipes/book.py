@@ -77,7 +77,7 @@ class RecipeFolder:
             _make(self.path.parent)
             fd = os.open(self.path.parent / LOCK, os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)
         except OSError as error:
-            raise _disk_error(error) from error
+            raise disk_error(error) from error
         try:
             _give_to_owner(fd, self.path.parent)
             fcntl.flock(fd, fcntl.LOCK_EX)
@@ -111,7 +111,7 @@ class RecipeFolder:
         try:
             entries = self.every()
         except OSError as error:
-            raise _disk_error(error) from error
+            raise disk_error(error) from error
         return {entry.name.casefold(): entry.id for entry in entries if isinstance(entry, Recipe)}
 
     def write(self, recipe: Recipe) -> None:
@@ -120,7 +120,7 @@ class RecipeFolder:
             _make(self.path)
             write_file(self._file(recipe.id), recipe_text(recipe).encode())
         except OSError as error:
-            raise _disk_error(error) from error
+            raise disk_error(error) from error
 
     def delete(self, recipe_id: str) -> None:
         """Moves a recipe's file to the folder of deleted ones, which keeps some."""
@@ -134,7 +134,7 @@ class RecipeFolder:
         except FileNotFoundError:
             pass
         except OSError as error:
-            raise _disk_error(error) from error
+            raise disk_error(error) from error
 
     def _file(self, recipe_id: str) -> Path:
         if not ID.fullmatch(recipe_id):
@@ -142,16 +142,23 @@ class RecipeFolder:
         return self.path / f"{recipe_id}{SUFFIX}"
 
     def _read(self, recipe_id: str) -> Recipe | BrokenRecipe:
-        try:
-            # A pipe is opened without waiting for a writer, which may never come.
-            fd = os.open(self._file(recipe_id), os.O_RDONLY | os.O_NONBLOCK | NO_LINK)
-            with open(fd, "rb") as file:
-                if not stat.S_ISREG(os.fstat(fd).st_mode):
-                    return BrokenRecipe(recipe_id, say("recipe_file_not_regular"))
-                content = file.read(MAX_FILE_BYTES + 1)
-        except OSError as error:
-            return BrokenRecipe(recipe_id, _disk_error(error).reason)
+        content = read_file(self._file(recipe_id), MAX_FILE_BYTES)
+        if isinstance(content, Text):
+            return BrokenRecipe(recipe_id, content)
         return recipe_of(recipe_id, content)
+
+
+def read_file(file: Path, most: int) -> bytes | Text:
+    """The content of a regular file, up to one byte more than `most`; or why it can't be read."""
+    try:
+        # A pipe is opened without waiting for a writer, which may never come.
+        fd = os.open(file, os.O_RDONLY | os.O_NONBLOCK | NO_LINK)
+        with open(fd, "rb") as opened:
+            if not stat.S_ISREG(os.fstat(fd).st_mode):
+                return say("recipe_file_not_regular")
+            return opened.read(most + 1)
+    except OSError as error:
+        return disk_error(error).reason
 
 
 def write_file(file: Path, content: bytes) -> None:
@@ -200,7 +207,8 @@ def _sync(folder: Path) -> None:
         os.close(fd)
 
 
-def _disk_error(error: OSError) -> RecipeDiskError:
+def disk_error(error: OSError) -> RecipeDiskError:
+    """Why the disk did not take a file."""
     code = OS_ERRORS.get(error.errno or 0)
     why = say(code) if code else printable(error.strerror or type(error).__name__)
     return RecipeDiskError(say("recipe_disk_failed", why=why))

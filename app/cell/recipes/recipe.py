@@ -132,13 +132,11 @@ def name_fault(name: str, taken: Iterable[str]) -> Text | None:
     return None
 
 
-def id_for(name: str, taken: Iterable[str]) -> str:
+def id_for(name: str, taken: Iterable[str], word: str = "recipe") -> str:
     """An id of a-z, 0-9 and "_" for a name, which also names its file: no path is made of what was
-    typed."""
+    typed. `word` stands for a name without such letters."""
     plain = unicodedata.normalize("NFKD", name).replace("×", "x").lower()
-    start = (
-        re.sub(r"[^a-z0-9]+", "_", plain.encode("ascii", "ignore").decode()).strip("_")[:50] or "recipe"
-    )
+    start = re.sub(r"[^a-z0-9]+", "_", plain.encode("ascii", "ignore").decode()).strip("_")[:50] or word
     known, number, made = set(taken), 1, start
     while made in known:
         number += 1

@@ -36,6 +36,7 @@ from app.cell.robot.traffic import RoundTrips, Traffic
 from app.cell.robot.transforms import TransformTree
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
+from app.panel.places import Place
 from app.panel.used import places_by_command, selects_by_command
 from app.panel.widgets.parameter import GET
 from app.panel.widgets.robot_options import ListingService
@@ -151,6 +152,7 @@ class RobotState:
         self.transforms = TransformTree()
         self.places, self.zones, self.map_views = panel.places, panel.zones, panel.map_views
         self.keep_out = KeepOut(panel.zones)
+        self.saved_places: tuple[Place, ...] = ()  # by operators, beside those of the panel file
         self.place_inputs = places_by_command(panel)
         self.history = History(time.monotonic(), time.time())
 

@@ -116,6 +116,8 @@ async def open_fleet(
             folder = settings.data_folder(mode_of(settings, panel))
             await fleet.alarms.start(folder, oplog, certificates)
             await fleet.recipes.start(folder, oplog)
+            if fleet.place_file is not None:
+                await fleet.place_file.start(folder)
             await fleet.start()
             if states is not None:
                 states.start()
@@ -129,6 +131,8 @@ async def open_fleet(
             await fleet.stop()
             await fleet.alarms.stop()
             await fleet.recipes.stop()
+            if fleet.place_file is not None:
+                await fleet.place_file.stop()
             if trends is not None:
                 await trends.stop()
             if recordings is not None:

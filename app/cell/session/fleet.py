@@ -44,6 +44,7 @@ from app.system.texts import TextLike, joined, say
 if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
     from app.cell.session.maps import MapPictures
+    from app.cell.session.place_file import SavedPlaceFile
 
 log = logging.getLogger("kiosk.fleet")
 
@@ -110,6 +111,15 @@ class _Watch:
 ConfigOf = Callable[[RobotEntry | None], Config]
 
 
+def _place_file(panel: Panel) -> "SavedPlaceFile | None":
+    """The file of saved places; None for a panel on which none can be saved."""
+    if not any(widget.save for widget in panel.place_inputs):
+        return None
+    from app.cell.session.place_file import SavedPlaceFile
+
+    return SavedPlaceFile()
+
+
 class Fleet:
     """Opened by `start`, closed by `stop`."""
 
@@ -149,6 +159,7 @@ class Fleet:
         self._shared_views: dict[str | None, ViewWithDeadlines] = {}  # by the robot's id
         self.alarms = Alarms(panel)
         self.recipes = Recipes(panel)
+        self.place_file = _place_file(panel)
         self.group_stops = GroupStops()
         self.confirm_locks = ConfirmLocks()  # locked until the users are known
         self.states: Path | None = None  # the file of the machine's states
@@ -164,6 +175,7 @@ class Fleet:
             doctor or NoDoctor(),
             self.recipes,
             self.confirm_locks,
+            self.place_file,
         )
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 from app.cell.alarms.engine import AlarmEngine
 from app.cell.alarms.published import PublishedAlarms
@@ -60,9 +60,11 @@ from app.system.log import RobotLog
 from app.system.texts import TextLike
 
 if TYPE_CHECKING:
+    from app.cell.commands.place_acts import RobotPlaces
     from app.cell.history.recording import Recorder, Recordings
     from app.cell.history.trends import TrendRecorder
     from app.cell.session.maps import MapListener
+    from app.cell.session.place_file import SavedPlaceFile
 
 
 # Replaces a lost Zenoh session, with retries.
@@ -118,6 +120,13 @@ class SessionRecorder(SampleListener, Protocol):
     def stop(self) -> None: ...
 
 
+class PlaceActs(NamedTuple):
+    """The saved places of a robot, and what runs the acts on them."""
+
+    places: "RobotPlaces"
+    runner: "ActRunner[RobotPlaces]"
+
+
 @dataclass(eq=False, kw_only=True)
 class RobotSession:
     """The session with one robot, opened by `start`, closed by `stop`. Used on the event loop only.
@@ -131,6 +140,7 @@ class RobotSession:
     control_acts: ActRunner[ControlAuthority]
     alarm_acts: ActRunner[AlarmEngine]
     recipe_acts: ActRunner[RecipeBooks]
+    place_acts: "PlaceActs | None"
     diagnostic_acts: ActRunner[Doctor]
     shift_acts: ActRunner[None]
     press_guard: PressGuard
@@ -297,6 +307,7 @@ class ServerParts:
     doctor: Doctor = field(default_factory=NoDoctor)
     recipes: Recipes | None = None
     confirm_locks: ConfirmLocks = UNKNOWN_USERS
+    place_file: "SavedPlaceFile | None" = None
 
 
 def wire_session(
@@ -409,6 +420,7 @@ def wire_session(
             act_context,
             further_lock=partial(lock_of_recipe, recipes, server.confirm_locks),
         ),
+        place_acts=_place_acts(server, robot, signals, act_context),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
         shift_acts=ActRunner("alarm", SHIFT_ACTS, None, act_context),
         press_guard=press_guard,
@@ -429,6 +441,26 @@ def wire_session(
     )
     _connect(signals, robot_alarms, session)
     return session
+
+
+def _place_acts(
+    server: ServerParts, robot: RobotState, signals: RobotSignals, context: ActContext
+) -> "PlaceActs | None":
+    """The acts on the saved places of one robot, which its view shows from now on; None for a panel on
+    which none can be saved, which does not import them."""
+    file = server.place_file
+    if file is None:
+        return None
+    from app.cell.commands.place_acts import PLACE_ACTS, RobotPlaces, needs_of_places
+
+    def follow() -> None:
+        robot.saved_places = file.saved.of_robot(robot.id)
+        signals.changed.emit()
+
+    file.add_listener(follow)
+    places = RobotPlaces(server.panel, robot, file, time.monotonic)
+    needs = partial(needs_of_places, server.panel)
+    return PlaceActs(places, ActRunner("place", PLACE_ACTS, places, context, needs))
 
 
 def _context(

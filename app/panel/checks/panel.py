@@ -50,6 +50,7 @@ from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.key_parts import confirmation_of
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.parts import parts_of
+from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.templated import is_stop
 from app.panel.widgets.trend import MAX_BYTES, Trend, memory_of, trends_of
@@ -140,6 +141,9 @@ def _needs(panel: Panel) -> Iterator[tuple[str, str | None]]:
             yield f"page[{p}].group[{g}]", group.needs
     for place, widget in _commands(panel):
         yield place, widget.needs
+    for p, page in enumerate(panel.pages):
+        placed = ((place, w) for place, w in page.placed() if isinstance(w, PlaceInput))
+        yield from ((f"page[{p}].{place}", w.needs) for place, w in placed)
     for a, alarm in enumerate(panel.alarms):
         yield f"alarm[{a}]", alarm.needs
 

@@ -81,6 +81,8 @@ def _input_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Faul
     for n, name in enumerate(widget.places or ()):
         if name not in known:
             yield Fault(f"{place}.places[{n}]", no_such("place", name, known), cause=f"place {name}")
-    if not known and not widget.touch:
-        message = "has nothing to choose: write [[place]] tables, or touch = true"
+    if widget.needs and not widget.save:
+        yield Fault(f"{place}.needs", "is for saving places: add save = true", cause="save")
+    if not known and not widget.touch and not widget.save:
+        message = "has nothing to choose: write [[place]] tables, or touch = true or save = true"
         yield Fault(f"{place}.touch", message, cause="place")

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 from pydantic import AfterValidator, Field
 
 from app.panel.base import Id, Rows, SaidLabel, Span, catalogue_default, distinct
+from app.panel.shared_keys import NeedsKey
 from app.panel.widgets.families import DisplayWidget, Input, TopicSource
 from app.ros.messages.validation import format_value
 from app.system.errors import InputError
@@ -49,16 +50,18 @@ def message_parts(x: float, y: float, yaw: float, frame: str, label: str) -> dic
     return dict(zip(PARTS, values, strict=True))
 
 
-class PlaceInput(DisplayWidget, Input):
-    """A place of the panel file or, with `touch`, a pose that is touched on the map with this id.
-    `radius` (metres) is how much floor must be free around it, by default the map's. Without
-    `require_pose` it may be chosen while it is not known where the robot is."""
+class PlaceInput(NeedsKey, DisplayWidget, Input):
+    """A place of the panel file or, with `touch`, a pose that is touched on the map with this id. With
+    `save` operators save places of their own; `needs` is what that needs beside its role. `radius`
+    (metres) is how much floor must be free around it, by default the map's. Without `require_pose` it
+    may be chosen while it is not known where the robot is."""
 
     parts: ClassVar[tuple[str, ...]] = PARTS
 
     kind: Literal["place"]
     map: Id
     touch: bool = False
+    save: bool = False
     places: Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(distinct)] | None = None
     radius: Annotated[float, Field(gt=0, le=10)] | None = None
     require_pose: bool = True

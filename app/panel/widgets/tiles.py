@@ -238,7 +238,7 @@ MAP: Final = Tile(
     lambda widget, screen: 2 * screen.touch(KEY_MM), lambda widget, screen: MAP_WIDTH, grows=True
 )
 PLACE: Final = Tile(
-    lambda widget, screen: LABEL_HEIGHT + 2 * screen.touch(PLACE_MM),
+    lambda widget, screen: LABEL_HEIGHT + (2 + widget.save) * screen.touch(PLACE_MM),
     lambda widget, screen: PLACE_WIDTH,
     grows=True,
 )

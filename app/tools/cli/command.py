@@ -58,6 +58,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "doctor": Command("find out what is wrong between a panel, this machine and the robot", "doctor"),
     "support": Command("collect what support needs to know in a zip file", "support"),
     "recipes": Command("list, export and import the recipes of a panel", "recipes"),
+    "places": Command("list and export the places that operators saved", "places"),
     "users": Command("add, change and list users and tokens of programs", "users"),
     "bridge-config": Command("write a configuration of the bridge that fits a panel", "bridge_config"),
     "certificate": Command("make the certificate of the panel's own server", "certificate"),

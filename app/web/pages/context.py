@@ -188,7 +188,7 @@ def page_context(
     embed = f"?{EMBED}=1" if embedded else ""
     back = f"{session.base}/pages/{page.id}"
     if framed:
-        back = f"{session.base if framed.tab == 'recipes' else state.root}{framed.path}"
+        back = f"{session.base if framed.tab in ('recipes', 'places') else state.root}{framed.path}"
     data = {
         **panel_data(panel, page, state.assets.scripts),
         "base": session.base,
@@ -275,9 +275,9 @@ REFRESH_S: Final = 10  # a page without scripts counts as gone when it has not b
 
 
 class FramedPage(NamedTuple):
-    """`path` is the path and query of the page, below that of its robot for recipes. `tab` is
-    the part of the panel whose scripts and style it has: "alarms", "diagnostics", "log", "recipes", ""
-    for another. `robot` is the id of the robot whose frame is around the page, "" for
+    """`path` is the path and query of the page, below that of its robot for recipes and places. `tab`
+    is the part of the panel whose scripts and style it has: "alarms", "diagnostics", "log", "places",
+    "recipes", "" for another. `robot` is the id of the robot whose frame is around the page, "" for
     that of all, which has the state of the first. `entries` is what is entered on it. `status` is that
     of the answer, such as 404."""
 

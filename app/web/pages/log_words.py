@@ -12,6 +12,7 @@ from app.cell.commands.acts import Act
 from app.cell.commands.alarm_acts import ALARM_ACTS
 from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.place_acts import PLACE_ACTS
 from app.cell.commands.recipe_acts import RECIPE_ACTS
 from app.cell.commands.shift_acts import SHIFT_ACTS
 from app.records import LogRow
@@ -26,6 +27,7 @@ TABLES: Final[Sequence[tuple[Kind, Mapping[str, Act[Any, Any]]]]] = (
     ("alarm", {**ALARM_ACTS, **SHIFT_ACTS}),
     ("diagnostics", DIAGNOSTIC_ACTS),
     ("recipe", RECIPE_ACTS),
+    ("place", PLACE_ACTS),
 )
 # Acts, and changes of control without an act, by the action of their entries.
 ACTION_WORDS: Final = {
@@ -48,6 +50,7 @@ OUTCOME_WORDS: Final = {
     "alarm": "log_outcome_alarm",
     "diagnostics": "log_outcome_diagnostics",
     "recipe": "log_outcome_recipe",
+    "place": "log_outcome_place",
     "access": "log_outcome_access",
     "began": "log_outcome_began",
     "changed": "log_outcome_changed",

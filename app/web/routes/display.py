@@ -13,7 +13,7 @@ from app.web.requests import TEXT, body_of, described_body, errors, form_of
 router = APIRouter()
 
 OWN_PAGE: Final = re.compile(
-    r"(/robots/[a-z0-9_]+)?/(pages|recipes)/[a-z0-9_]+|/log|/alarms(/history|/report)?"
+    r"(/robots/[a-z0-9_]+)?/(pages|places|recipes)/[a-z0-9_]+|/log|/alarms(/history|/report)?"
     r"|/diagnostics|/help|/signin|/users"
 )
 # What is none of these is ignored: a page that is still open may be of another version.

@@ -45,6 +45,7 @@ OTHER_PAGES = (
     "signin.html",
     "users.html",
     "recipes.html",
+    "places.html",
     "alarms.html",
     "alarm-confirm.html",
     "alarm-history.html",

@@ -178,9 +178,21 @@ class PlaceInput {
       find(this.#card, "dl").replaceChildren(...rows);
     }
     setText(find(this.#card, ".refusal"), card?.reason ?? "");
+    this.#offerSave(card);
     this.#draw();
     this.#goal?.show(card?.pose ?? null, card !== null && !card.reason);
     this.#symbols?.show(this.#places, card?.value ?? "");
+  }
+
+  // A touched pose may be saved as a place, on a page of its own.
+  /** @param {Card | null} card */
+  #offerSave(card) {
+    const link = /** @type {HTMLAnchorElement | null} */ (this.#card.querySelector(".save-touched"));
+    if (!link) return;
+    const isPlace = this.#places.some((place) => place.id === card?.value);
+    link.hidden = !card || isPlace || card.reason !== "";
+    const path = `${pageGuard.page.base}/places/${this.#root.dataset.widget}`;
+    if (card) link.href = `${path}?mode=save&value=${encodeURIComponent(card.value)}`;
   }
 
   // The robot drives, and the map may change: the card says it. What is entered stays as it is.

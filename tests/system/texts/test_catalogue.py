@@ -35,6 +35,7 @@ PREFIXES = (
     "users_page_remove_",
     "users_page_sure_",
     "log_page_",
+    "places_",
     "recipes_",
 )  # of codes that are put together
 SENTENCES = sentences(ENGLISH)

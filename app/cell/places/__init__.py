@@ -1,0 +1,1 @@
+"""Places on a map that operators save while the panel runs."""
