@@ -84,6 +84,11 @@ def violations(page: Page, themes: Sequence[str] = CHOICES["theme"]) -> list[Any
 
 
 # (selector, property, value) in each rule of a theme.
+COLOUR_PROPERTIES: Final = (
+    "color-scheme",
+    "filter",
+    "mix-blend-mode",
+)  # the last two of a plan on a map
 OF_THEMES: Final = """() => {
   const inside = (rule) => [...(rule.cssRules ?? [])].flatMap(inside).concat(
     rule.selectorText?.includes("[data-theme") ? [...rule.style].map((name) =>
@@ -94,13 +99,11 @@ OF_THEMES: Final = """() => {
 
 def test_a_theme_changes_colours_only(shipped: Server, page: Page) -> None:
     page.goto(f"{shipped.url}/gallery")
-    properties = page.evaluate(OF_THEMES)
+    properties = [each for each in page.evaluate(OF_THEMES) if each[1] not in COLOUR_PROPERTIES]
     assert len(properties) > 50
-    assert [
-        name for _, name, _ in properties if name != "color-scheme" and not name.startswith("--")
-    ] == []
+    assert [name for _, name, _ in properties if not name.startswith("--")] == []
     is_colour = "(values) => values.filter((one) => !CSS.supports('color', one))"
-    assert page.evaluate(is_colour, [v for _, name, v in properties if name != "color-scheme"]) == []
+    assert page.evaluate(is_colour, [v for _, _, v in properties]) == []
     for theme in CHOICES["theme"]:
         page.context.add_cookies([{"name": COOKIE.format("theme"), "value": theme, "url": shipped.url}])
         page.goto(f"{shipped.url}/log")

@@ -71,6 +71,13 @@ def test_a_mistake_of_the_widget_is_reported_once_at_its_own_table(tmp_path: Pat
     assert [place for place, _, _ in faults_of(tmp_path, text)] == ["page[0].widget[1].topics"]
 
 
+def test_an_id_that_is_no_text_is_named_in_place_of_the_copy_that_lacks_its_widget(
+    tmp_path: Path,
+) -> None:
+    text = PAGES.format(main="", data="true", other=SAME).replace('id = "start"', "id = 1979-05-27")
+    assert [place for place, _, _ in faults_of(tmp_path, text)] == ["page[0].widget[1].id"]
+
+
 def test_a_page_that_lacks_the_input_of_the_message_is_named(tmp_path: Path) -> None:
     text = PAGES.format(main="", data='"{speed}"', other=SAME).replace("msg/Bool", "msg/Int8")
     [(place, message, line)] = faults_of(tmp_path, text)

@@ -64,6 +64,7 @@ def with_copies(tables: dict[str, Any]) -> WithCopies:
     origins, chains = _origins(tables)
     frame = {table["id"] for table in _tables_at(tables, "frame") if _has_id(table)}
     made = WithCopies({**tables, "page": deepcopy(tables["page"])})
+    no_ids = list(_no_ids(tables))
     whole = [each for each in _widgets(tables) if NAME not in each[2]]
     seen = {(page, table["id"]): place for page, place, table in reversed(whole) if _has_id(table)}
     for (page, place, table), (_, _, copy) in zip(
@@ -75,6 +76,9 @@ def with_copies(tables: dict[str, Any]) -> WithCopies:
         fault = _fault(table, place, origins, chains, frame) or _twice(name, place, page, seen)
         if fault is not None:
             made.faults.append(fault)
+            if isinstance(name, str) and name not in chains.keys() | origins.keys() and no_ids:
+                made.faults[-1:] = no_ids  # it may be the widget whose id is no text
+                no_ids = []
             continue
         at, origin = origins[name]
         copy.clear()
@@ -139,6 +143,13 @@ def _origins(
             else:
                 origins.setdefault(table["id"], (place, table))
     return origins, chains
+
+
+def _no_ids(tables: Mapping[str, Any]) -> Iterator[Fault]:
+    """The faults of ids that are no text."""
+    for _, place, table in _widgets(tables):
+        if "id" in table and not _has_id(table):
+            yield Fault(f"{place}.id", f"must be text, not {format_value(table['id'])}")
 
 
 def _has_id(table: Mapping[str, Any]) -> bool:
