@@ -17,7 +17,7 @@ OWN_PATHS: Final = frozenset(
     {
         *("pages", "events", "widgets", "presses", "control", "robots", "log", "log.csv", "display"),
         *("alarms", "diagnostics", "recordings", "help", "recipes", "session", "signin", "users"),
-        *("static", "healthz", "readyz", "metrics", "gallery", "openapi.json"),
+        *("places", "static", "healthz", "readyz", "metrics", "gallery", "openapi.json"),
     }
 )
 
