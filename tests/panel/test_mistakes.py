@@ -267,6 +267,7 @@ SHOWS_AT: Final[Mapping[str, str]] = {
     'ack_command = "tell"': 'ack_input = "note"',
     'role = "reset"': 'colour = "blue"',
     'durability = "volatile"': 'qos = { durability = "volatile" }',
+    "save = true": "needs = 'engineer'",
 }
 
 
