@@ -9,7 +9,7 @@ from app.cell.permission.verdict import topic_mismatch
 from app.cell.robot.map_layers import LayerState, Shape, placed
 from app.cell.robot.maps import Arrival, Geometry, Grid
 from app.cell.robot.state import RobotState
-from app.cell.robot.transforms import IDENTITY, LocatedFrame, Pose, Transform
+from app.cell.robot.transforms import IDENTITY, LocatedFrame, Pose, Quaternion, Transform
 from app.panel.shared_keys import stale_at
 from app.panel.widgets.map_layers import GRID_TYPE, LayerName, MapLayer
 from app.panel.widgets.map_view import MapView
@@ -118,7 +118,8 @@ def _drawn(
 
 def _placed(state: LayerState, shape: Shape, frame: str, transform: Transform) -> list[int]:
     """The points in the map's frame: the same list again while nothing moves."""
-    rounded = Transform(*(tuple(round(part, 4) for part in parts) for parts in transform))  # type: ignore[arg-type]
+    x, y, z = (round(part, 4) for part in transform.place)
+    rounded = Transform((x, y, z), Quaternion(*(round(part, 4) for part in transform.turned)))
     if state.placed is None or state.placed[:3] != (shape, frame, rounded):
         state.placed = shape, frame, rounded, placed(shape, transform)
     return state.placed[3]

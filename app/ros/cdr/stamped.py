@@ -20,9 +20,10 @@ _STAMP_BYTES: Final = 8
 _NUMBERS_BYTES: Final = 56  # place and rotation
 _LEAST_POSE: Final = _STAMP_BYTES + _COUNT_BYTES + 1 + _NUMBERS_BYTES
 # A count, a stamp, a place with a rotation, and a place in the plane.
+_ORDERS: Final[tuple[ByteOrder, ...]] = ("<", ">")
 _FORMS: Final[Mapping[ByteOrder, tuple[Struct, Struct, Struct, Struct]]] = {
-    order: tuple(Struct(order + form) for form in ("I", "iI", "7d", "2d"))  # type: ignore[misc]
-    for order in ("<", ">")
+    order: (Struct(f"{order}I"), Struct(f"{order}iI"), Struct(f"{order}7d"), Struct(f"{order}2d"))
+    for order in _ORDERS
 }
 
 

@@ -48,7 +48,7 @@ class MapChecks:
             self._find("map_not_latched", topic)
 
     def _payloads(self, topic: str) -> Iterator[tuple[bytes, float]]:
-        """(bytes, monotonic seconds) of what came on a topic."""
+        """(bytes, monotonic seconds) of the messages of a topic."""
         for sample in self._observed.samples[self._behind.robot.key(topic)]:
             yield bytes(sample.payload), sample.at
 

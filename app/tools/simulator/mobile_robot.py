@@ -341,7 +341,7 @@ class MobileRobot:
             self._teleop, self._teleop_until = (speed, turning), self.t + TELEOP_S
 
     def set_pose(self, pose: Pose) -> None:
-        """It is told where it is: the robot of a demo knows, and is less sure for a while."""
+        """Its position is set: the robot of a demo knows it, and is less sure for a while."""
         self.uncertainty = 0.5
 
     def put_obstacle(self, *, there: bool) -> str:
