@@ -182,6 +182,13 @@ def test_a_folder_of_a_room_imports_only_from_those_before_it(room: str) -> None
         assert back == []
 
 
+def test_only_the_tools_know_the_reference_of_the_panel_file() -> None:
+    """The server needs neither the words of keys nor the JSON Schema."""
+    reference = "app.panel.reference"
+    others = {m for m in MODULES if room_of(m) != "tools" and not m.startswith(reference)}
+    assert {m for m in others if any(name.startswith(reference) for name in of_project(m))} == set()
+
+
 def test_no_module_imports_itself_by_way_of_others() -> None:
     order = graphlib.TopologicalSorter({module: of_project(module) for module in MODULES})
     order.prepare()  # CycleError names those of a cycle

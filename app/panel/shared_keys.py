@@ -1,5 +1,5 @@
 """Keys that several tables of a panel file take: their types, their checks, and what is computed with
-them. `docs/_generate/panel_keys.toml` says once what each means."""
+them. `app/panel/reference/panel_keys.toml` says once what each means."""
 
 import math
 from collections.abc import Iterator

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
+from app.panel.reference.schema import panel_schema
 from bench.report.pages import comparison_table, last_results, readme_section
 from docs._generate.findings import findings_tables
 from docs._generate.icon_names import icon_list
@@ -17,11 +18,10 @@ from docs._generate.keys import key_tables
 from docs._generate.limits import limits_table
 from docs._generate.locks import lock_tables, translated_page, translations
 from docs._generate.places import models_table, paths_table, sentences_table
-from docs._generate.schema import FILE as SCHEMA
-from docs._generate.schema import panel_schema
 from docs._generate.settings import settings_table
 
 DOCS: Final = Path(__file__).parent.parent
+SCHEMA: Final = DOCS / "panel.schema.json"
 
 
 def files() -> Iterator[tuple[Path, str]]:

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from app.panel.base import TEXTS
-from app.system.toml_values import key_text
-from docs._generate.schema import (
+from app.panel.reference.schema import (
     ANY,
     REF,
     ROOT,
@@ -20,6 +19,7 @@ from docs._generate.schema import (
     panel_schema,
     said_at,
 )
+from app.system.toml_values import key_text
 
 EVERYTHING: Final = Path(__file__).parents[2] / "tests/everything.toml"
 EXACT: Final = 2**53  # the limit of every number in a browser: it is described once, not at each key

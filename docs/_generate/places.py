@@ -11,10 +11,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from app.panel.reference.schema import ROOT, models
 from app.system import texts as i18n
 from app.system.texts import BETWEEN, ENGLISH, sentences
 from docs._generate.locks import shown
-from docs._generate.schema import ROOT, models
 
 SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]

@@ -10,10 +10,11 @@ from typing import Any, Final
 import pytest
 from jsonschema_rs import Draft7Validator
 
+from app.panel.reference import schema
 from app.system.settings import VARIABLES
 from app.system.texts import BETWEEN, ENGLISH, sentences
 from app.system.texts.catalogue import catalogues_in
-from docs._generate import locks, places, schema
+from docs._generate import locks, places
 from docs._generate import settings as variables
 from docs._generate.__main__ import filled, out_of_date
 from docs._generate.keys import examples_of

@@ -27,6 +27,7 @@ from app.panel import Panel, load_panel
 from app.panel.file.keys import inner_model
 from app.panel.file.load import faults_of_text
 from app.panel.file.same_widgets import NAME as SAME
+from app.panel.reference import schema
 from app.panel.shared_keys import AgeKey, FieldKeys, NeedsKey, NumberKeys, RobotKey, RobotsKey
 from app.panel.widgets.displays import Readout, StatesKey
 from app.panel.widgets.families import BaseWidget, Command
@@ -36,7 +37,6 @@ from app.panel.widgets.service_action import ServerCommand
 from app.panel.widgets.table import Table
 from app.ros.zenoh.sample import Sample
 from app.system.toml_values import value_text
-from docs._generate import schema
 from tests.cell.view.test_map_values import INFO, moved
 from tests.support.beside_panel import put_beside
 from tests.support.builders import BRIDGE, INTERFACES, NOW, endpoint, robot_there

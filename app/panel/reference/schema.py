@@ -23,7 +23,6 @@ from app.ros.messages.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPI
 
 Schema = dict[str, Any]
 
-FILE: Final = Path(__file__).parent.parent / "panel.schema.json"
 WORDS: Final[Mapping[str, Any]] = tomllib.loads(
     Path(__file__).with_name("panel_keys.toml").read_text(encoding="utf-8")
 )
@@ -190,7 +189,7 @@ def said_at(table: str, key: str) -> str:
     for section in (table, *classes, ANY):
         if key in WORDS.get(section, {}):
             return str(section)
-    raise KeyError(f'docs/_generate/panel_keys.toml does not say what "{key}" of "{table}" means')
+    raise KeyError(f'app/panel/reference/panel_keys.toml does not say what "{key}" of "{table}" means')
 
 
 @cache
