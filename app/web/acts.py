@@ -18,11 +18,13 @@ from app.cell.commands.acts import NO_VALUES, ActReceipt, ActRequest, ActRunner
 from app.cell.commands.control_acts import TOO_OFTEN
 from app.cell.commands.press import PRESS_ID
 from app.records.principal import Principal
+from app.system.errors import InputError
 from app.system.texts import Text, TextLike, say
 from app.web.answers import receipt_answer
-from app.web.app_state import AppState
+from app.web.app_state import EMPTY_FORM, AppState, RefusedForm
 from app.web.caller import Caller, caller_of
 from app.web.requests import (
+    LONGEST,
     Described,
     FormFields,
     Moment,
@@ -34,6 +36,7 @@ from app.web.requests import (
 )
 
 TOO_SOON: Final = say("press_too_soon")
+BAD_ENTRY: Final = "entry"  # in the query of a page: what was entered could not be read
 NOT_KEPT: Final[Mapping[str, Text]] = {text.code: text for text in (TOO_OFTEN, TOO_SOON)}
 ID_MOST: Final = 400  # characters of an act's id
 Content = Mapping[str, Any]
@@ -64,15 +67,20 @@ def act_responses(model: type[BaseModel]) -> Described:
     )
 
 
+class UnreadableEntry(InputError):
+    """What was entered in a field of a form is not what its input takes."""
+
+
 @dataclass(frozen=True, slots=True)
 class SentAct(Generic[Body]):
-    """An act as a client sent it. `form` has the fields of a form, None for JSON; `token` is that of a
-    new client, "" for a known one."""
+    """An act as a client sent it. `form` has the fields of a form, None for JSON; `typed` are those
+    that its page shows again if it is refused. `token` is that of a new client, "" for a known one."""
 
     caller: Caller
     state: AppState
     body: Body
     form: Mapping[str, str] | None
+    typed: Mapping[str, str]
     who: Principal
     token: str
 
@@ -108,10 +116,12 @@ class SentAct(Generic[Body]):
         return self.with_cookie(receipt_answer(self.caller, content, receipt.cause))
 
     def back(self, page: str, receipt: ActReceipt | None, name: str = "act") -> Response:
-        """The redirect to a page that shows a receipt."""
+        """The redirect to a page that shows a receipt, and what was typed if the act was refused."""
         if receipt is not None:
             shown = receipt.code if receipt.cause == "limit" else receipt.id
-            page += f"{'&' if '?' in page else '?'}{name}={quote(shown, safe='')}"
+            page = _showing(page, name, shown)
+            if not receipt.done:
+                keep_form(self.state, self.who, RefusedForm(page, self.typed))
         return self.with_cookie(RedirectResponse(page, status_code=303))
 
     def with_cookie(self, answer: Response) -> Response:
@@ -127,6 +137,37 @@ def said_of(query: str, runners: Iterable[ActRunner[Any]]) -> TextLike:
     return next((receipt.reason for receipt in receipts if receipt is not None), "")
 
 
+def _showing(page: str, name: str, shown: str) -> str:
+    return f"{page}{'&' if '?' in page else '?'}{name}={quote(shown, safe='')}"
+
+
+def keep_form(state: AppState, who: Principal, form: RefusedForm) -> None:
+    """Keeps what a client typed in a form that was refused, in place of its form before. A longer text
+    is not kept: it comes from a file, which can be chosen again."""
+    if sum(map(len, form.typed.values())) <= LONGEST:
+        state.refused_forms[who.client.id, who.user] = form
+
+
+def refused_form(request: Request, state: AppState) -> RefusedForm:
+    """What the client typed, if the page of this request comes after the refusal of its form; else an
+    empty form."""
+    who = caller_of(request).principal
+    form = state.refused_forms.get((who.client.id, who.user))
+    address = f"{request.url.path}?{request.url.query}"
+    return form if form is not None and form.page == address else EMPTY_FORM
+
+
+def entered_again(
+    request: Request, state: AppState, page: str, typed: Mapping[str, str], reason: TextLike
+) -> Response:
+    """The redirect of a form, of which an entry can't be read, to its page with what was typed."""
+    caller = caller_of(request)
+    who, token = caller.identified()
+    page = _showing(page, "act", BAD_ENTRY)
+    keep_form(state, who, RefusedForm(page, typed, reason))
+    return caller.with_client_cookie(RedirectResponse(page, status_code=303), token)
+
+
 async def sent_act(
     request: Request,
     state: AppState,
@@ -137,18 +178,19 @@ async def sent_act(
     """The act of a request, whose form has these fields. `read_form` makes the body of a form; without
     it the fields that the model has are its body."""
     is_form, content = await act_body_of(request, form)
-    return sent_with(request, state, model, content, is_form, read_form)
+    return sent_with(request, state, model, form, content, is_form, read_form)
 
 
 def sent_with(
     request: Request,
     state: AppState,
     model: type[Body],
+    form: FormFields,
     content: Content,
     is_form: bool,
     read_form: ReadForm | None = None,
 ) -> SentAct[Body]:
-    """The act of a request with this content."""
+    """The act of a request with this content; `form` are the fields that a form may have."""
     body = content
     if is_form:
         fields = model.model_fields
@@ -156,4 +198,5 @@ def sent_with(
     act = as_model(model, body)
     caller = caller_of(request)
     who, token = caller.identified()
-    return SentAct(caller, state, act, content if is_form else None, who, token)
+    typed = form.typed(content) if is_form else {}
+    return SentAct(caller, state, act, content if is_form else None, typed, who, token)

@@ -1,8 +1,8 @@
 """The application's state, typed, as the routes get it."""
 
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import Depends, Path
 from starlette.requests import HTTPConnection
@@ -20,11 +20,27 @@ from app.records import NullLog, OperatorLog
 from app.records.press_record import PressLog
 from app.records.principal import Clients
 from app.system.concurrency import BuiltOnce, InFlight
+from app.system.limits import BoundedDict
 from app.system.texts import TextLike
 from app.web.assets import Assets
 from app.web.downloads import SharedRecordings
 from app.web.metrics import Metrics, PageTrips
 from app.web.pages.page_templates import PageTemplates
+
+FORMS_KEPT: Final = 64
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedForm:
+    """What was typed in a form that was refused: its page, with its query, shows it again. `reason` is
+    why, where no receipt says it."""
+
+    page: str
+    typed: Mapping[str, str]
+    reason: TextLike = ""
+
+
+EMPTY_FORM: Final = RefusedForm("", {})
 
 
 @dataclass(slots=True)
@@ -45,6 +61,10 @@ class AppState:
     in_flight: InFlight = field(default_factory=InFlight)
     shared: SharedRecordings = field(default_factory=SharedRecordings)
     description: BuiltOnce[tuple[bytes, bytes]] | None = None
+    # The newest of each client, by the ids of the client and of the user.
+    refused_forms: BoundedDict[tuple[str, str], RefusedForm] = field(
+        default_factory=lambda: BoundedDict[tuple[str, str], RefusedForm](FORMS_KEPT)
+    )
     user_acts: ActRunner[Access] = field(init=False)
     confirmer: Confirmer = field(init=False)
 

@@ -88,6 +88,7 @@ SINCE: Final[Field] = {
     "description": "when the page was rendered, in the server's own time",
     "pattern": MOMENT,
 }
+OF_PAGE: Final = frozenset({"_since", "id", "-id"})  # fields that each rendered page has anew
 
 
 class FormFields:
@@ -135,6 +136,13 @@ class FormFields:
                 _check(name, field, text)
                 filled[name] = text
         return filled
+
+    def typed(self, form: Mapping[str, str]) -> dict[str, str]:
+        """What was entered: the fields without secrets and without those of the page itself."""
+        return {name: text for name, text in form.items() if not self._is_own_or_secret(name)}
+
+    def _is_own_or_secret(self, name: str) -> bool:
+        return name in OF_PAGE or (self._field(name) or {}).get("format") == "password"
 
     def _field(self, name: str) -> Field | None:
         if name in self._fields:

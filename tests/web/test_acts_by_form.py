@@ -53,6 +53,23 @@ label = "Places"
 map = "hall"
 touch = true
 save = true
+[[page.widget]]
+id = "remark"
+kind = "text"
+label = "Remark"
+[[page.widget]]
+id = "tell"
+kind = "publish"
+label = "Tell"
+topic = "/remark"
+type = "std_msgs/msg/String"
+message = { data = "{remark}" }
+interlock = "never"
+[[interlock]]
+id = "never"
+topic = "/never"
+type = "std_msgs/msg/Bool"
+field = "data"
 """
 PATIENT: Final = "tests.support.apps.patient:app"
 PIN: Final = "2580"
@@ -145,6 +162,63 @@ ROWS: Final = (
     Row("/places/goal/delete", {"place": "bay"}),
     Row("/places/goal/delete", {"place": "bay"}, code="saved_place_gone"),
 )  # fmt: skip
+
+
+class TypedForm(NamedTuple):
+    """A form of a page on which text is entered: what is typed, and the markup that shows it again."""
+
+    page: str
+    action: str
+    typed: Fields
+    again: tuple[str, ...]
+
+
+TYPED: Final = (
+    TypedForm(
+        "/users?mode=add",
+        "/users/add",
+        {"name": "Kato", "role": "viewer", "way": "password", "secret": SECRET},
+        ('name="name" type="text" maxlength="40" required autocomplete="off" value="Kato"',
+         'value="viewer" required checked', 'value="password" checked'),
+    ),
+    TypedForm(
+        "/users?mode=token", "/users/token", {"name": "mes 7", "role": "viewer"},
+        ('value="mes 7"', 'value="viewer" required checked'),
+    ),
+    TypedForm(
+        "/recipes/boxes?mode=new",
+        "/recipes/boxes/create",
+        _recipe(name="Lid", values={**RECIPE, "length": 455, "note": "blue"}),
+        ('value="Lid"', 'value="455"', 'value="82.5"', 'value="blue"'),
+    ),
+    TypedForm(
+        "/recipes/boxes?recipe=kept&mode=edit",
+        "/recipes/boxes/save",
+        _recipe(recipe="kept", version=1, values={**RECIPE, "length": 466}),
+        ('value="466"',),
+    ),
+    TypedForm(
+        "/recipes/boxes?recipe=kept&mode=copy", "/recipes/boxes/copy",
+        _recipe(recipe="kept", version=1, name="Copied"), ('value="Copied"',),
+    ),
+    TypedForm(
+        "/recipes/boxes?recipe=kept&mode=rename", "/recipes/boxes/rename",
+        _recipe(recipe="kept", version=1, name="Renamed"), ('value="Renamed"',),
+    ),
+    TypedForm(
+        "/recipes/boxes?mode=csv", "/recipes/boxes/import",
+        {"-csv": CSV}, (">name,length,speed,gripper,fast,note\nTray,600,80,fork,true,x\n</textarea>",),
+    ),
+    TypedForm("/places/goal?mode=save", "/places/goal/save", {"name": "Gate"}, ('value="Gate"',)),
+    TypedForm("/alarms/report", "/alarms/report", {"text": "Oil is low."}, ('value="Oil is low."',)),
+    TypedForm("/pages/drive", "/widgets/tell", {"remark": "as agreed"}, ('value="as agreed"',)),
+)  # fmt: skip
+NOT_READ: Final = TypedForm(
+    "/recipes/boxes?mode=new",
+    "/recipes/boxes/create",
+    {"-name": "Lid", "length": "45O", "speed": "80", "gripper": "fork", "note": "blue"},
+    ('value="Lid"', 'value="45O"', 'value="80"', 'value="blue"'),
+)
 
 
 @pytest.fixture(scope="module")
@@ -300,3 +374,49 @@ def test_every_act_is_refused_alike_by_json_and_by_form(
         assert (receipt["code"], program.answer.status_code) == refusal, (row, receipt)
         assert page.answer.status_code == 303, row
     assert len(logged) == judged
+
+
+def sent_at_once(client: httpx.Client, form: TypedForm, act_id: str) -> str:
+    """The page after a form that was sent as soon as its page was there."""
+    headers = {"accept": "text/html"}
+    page = client.get(form.page, headers=headers).text
+    (since, *_) = re.findall(r'name="_since" value="([0-9.]+)"', page)
+    own = "-id" if form.action.startswith("/recipes") else "id"
+    fields = {"_since": since, **({} if form.action.startswith("/widgets") else {own: act_id})}
+    fields |= {name: str(text) for name, text in form.typed.items()}
+    answer = client.post(form.action, data=fields, headers=headers)
+    if seen := re.search(r'name="-seen" value="([^"]+)"', answer.text):  # the comparison before
+        answer = client.post(form.action, data={**fields, "-seen": seen[1]}, headers=headers)
+    assert answer.status_code == 303, (form, answer.text)
+    assert SECRET not in answer.headers["location"]
+    shown = client.get(answer.headers["location"], headers=headers, follow_redirects=True)
+    assert shown.status_code == 200
+    return html.unescape(shown.text)
+
+
+def test_a_form_that_is_refused_has_again_what_was_typed(
+    browsers: Browsers, cells: tuple[Server, Server]
+) -> None:
+    server = cells[1]
+    client = browsers.signed_in(server.url, "Sato", pin=PIN)
+    client.post("/control/take", json={}).raise_for_status()
+    client.post("/recipes/boxes/create", json={"name": "Kept", "values": RECIPE}).raise_for_status()
+    for place, form in enumerate((*TYPED, NOT_READ)):
+        shown = sent_at_once(client, form, f"typed-{place}")
+        assert all(text in shown for text in form.again), (form, shown)
+        assert SECRET not in shown
+        fresh = client.get(form.page, headers={"accept": "text/html"}).text
+        assert not any(text in html.unescape(fresh) for text in form.again[:1]), form
+    last = client.get("/places/goal?mode=save&act=press_too_soon").text
+    assert "Gate" not in last  # a later form took its place
+
+
+def test_the_message_that_was_typed_is_shown_to_its_browser_only(
+    browsers: Browsers, cells: tuple[Server, Server]
+) -> None:
+    (message,) = (form for form in TYPED if form.action == "/alarms/report")
+    client, other = (browsers.signed_in(cells[1].url, "Sato", pin=PIN) for _ in range(2))
+    assert "Oil is low." in sent_at_once(client, message, "own")
+    address = "/alarms/report?act=press_too_soon"
+    assert "Oil is low." in client.get(address).text
+    assert "Oil is low." not in other.get(address).text

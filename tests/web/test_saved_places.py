@@ -69,7 +69,9 @@ def test_where_the_robot_is_can_be_saved(shuttle: Server) -> None:
     assert receipt["done"], receipt
     until(lambda: "Here" in offered(shuttle), "it is offered")
     x, y, _ = offered(shuttle)["Here"]["pose"]
-    assert re.fullmatch(rf"Here saved: x {x:.2f} m, y {y:.2f} m\.", receipt["reason"].replace("−", "-"))
+    said = re.fullmatch(r"Here saved: x (\S+) m, y (\S+) m\.", receipt["reason"].replace("−", "-"))
+    assert said, receipt
+    assert [float(text) for text in said.groups()] == pytest.approx([x, y], abs=0.006)  # rounded twice
     assert shuttle.http.post("/places/goal/delete", json={"place": "here"}).json()["done"]
 
 

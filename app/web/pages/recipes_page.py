@@ -29,7 +29,7 @@ from app.cell.recipes.reported import (
 from app.cell.robot.state import RobotState
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, Input
-from app.panel.widgets.inputs import SelectInput, TextInput
+from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.system.clock import format_datetime
@@ -40,6 +40,7 @@ from app.web.pages.log_words import who_of
 Mode = Literal["show", "edit", "new", "copy", "rename", "delete", "history", "csv"]
 State = Literal["same", "differs", "unknown"]
 NO_VALUES: Final[Values] = {}
+NO_TYPED: Final[Mapping[str, str]] = {}
 NAME_FIELD: Final = "-name"
 
 
@@ -99,6 +100,7 @@ class RecipesContext(TypedDict):
     history: list[VersionRow]
     entered: Mapping[str, Any]
     name_input: TextInput
+    csv: str
     said: TextLike
 
 
@@ -134,8 +136,9 @@ def recipes_context(
     recipe_id: str,
     mode: Mode,
     said: TextLike,
+    typed: Mapping[str, str] = NO_TYPED,
 ) -> RecipesContext:
-    """What the page shows now."""
+    """What the page shows now; `typed` is what a refused form had."""
     load, recipes = book.load, book.recipes
     reported = reported_fields(load, robot, time.monotonic())
     in_robot = loaded(load.fields, recipes, reported) or ()
@@ -159,7 +162,9 @@ def recipes_context(
         unloadable=_unloadable(load, values) if chosen else "",
         history=list(_history(load, chosen)) if chosen else [],
         entered=_entered(load, values if mode == "edit" else NO_VALUES)
-        | ({NAME_FIELD: chosen.name} if chosen and mode == "rename" else {}),
+        | ({NAME_FIELD: chosen.name} if chosen and mode == "rename" else {})
+        | _typed(load, typed),
+        csv=typed.get("-csv", ""),
         name_input=name_input(),
         said=said,
     )
@@ -238,6 +243,12 @@ def _history(load: RecipeLoad, recipe: Recipe) -> Sequence[VersionRow]:
         at = format_datetime(version.at)
         rows.append(VersionRow(version.number, at, _by(version.by), act, changes, is_now))
     return rows[::-1]
+
+
+def _typed(load: RecipeLoad, typed: Mapping[str, str]) -> dict[str, Any]:
+    """What was typed, as `_entered` has it: a toggle is on or off, all else is text."""
+    toggles = {field.id for field in load.fields if isinstance(field, ToggleInput)}
+    return {name: text == "true" if name in toggles else text for name, text in typed.items()}
 
 
 def _entered(load: RecipeLoad, values: Values) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final, Literal, TypedDict
 
-from app.cell.commands.acts import ActRequest
+from app.cell.commands.acts import NO_VALUES
 from app.cell.people.access import Access
 from app.cell.people.secrets_hash import WAYS, Way
 from app.cell.people.users import User
@@ -16,6 +16,7 @@ from app.system.texts import Param, Text, TextLike, joined, number, say
 from app.web.pages.sign_in import ROLE_WORDS
 
 Mode = Literal["show", "add", "role", "pin", "password", "badge", "remove", "token", "revoke"]
+GROUP: Final = "group-"  # stands before the id of a group in a form
 OF_TOKENS: Final = frozenset({"token", "revoke"})
 
 
@@ -71,11 +72,11 @@ def users_context(
     tokens: bool,
     mode: Mode,
     said: TextLike = "",
-    refused: ActRequest | None = None,
+    refused: Mapping[str, str] = NO_VALUES,
     token: str = "",
 ) -> UsersContext:
-    """What the page shows now. `name` is that of the chosen user or token, `refused` an act whose form
-    is shown again, `token` one that was made just now."""
+    """What the page shows now. `name` is that of the chosen user or token, `refused` what was
+    typed in a form that is shown again, `token` one that was made just now."""
     tokens = tokens or mode in OF_TOKENS
     book = access.book
     rows = _token_rows(access) if tokens else [_row(user, who) for user in book.users]
@@ -103,11 +104,12 @@ def users_context(
     )
 
 
-def _typed(refused: ActRequest | None, chosen: SelectedAccount | None, role: str) -> dict[str, Any]:
+def _typed(refused: Mapping[str, str], chosen: SelectedAccount | None, role: str) -> dict[str, Any]:
     """What the fields of the form have at first."""
-    empty = {"name": "", "role": role, "groups": ()}
-    if refused is not None:
-        return {**empty, **refused.values, "name": refused.object}
+    empty = {"name": "", "role": role, "groups": (), "way": WAYS[0]}
+    if refused:
+        groups = [name.removeprefix(GROUP) for name in refused if name.startswith(GROUP)]
+        return {**empty, **refused, "groups": groups}
     if chosen is not None:
         return {**empty, "role": chosen.role, "groups": chosen.groups}
     return empty

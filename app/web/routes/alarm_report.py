@@ -26,7 +26,7 @@ from app.records import Filter, LogRow, OperatorLog
 from app.system.clock import format_datetime, format_time
 from app.system.printable import printable, printable_texts
 from app.system.texts import Text, TextLike, date_and_time, number, say, time_of_day
-from app.web.acts import ActBody, act_responses, said_of, sent_act
+from app.web.acts import ActBody, act_responses, refused_form, said_of, sent_act
 from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentState
 from app.web.pages.alarm_figures import (
@@ -40,7 +40,7 @@ from app.web.pages.alarms import word
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import ACTION_WORDS, outcome_of, who_of
 from app.web.pages.log_words import word as log_word
-from app.web.requests import FormFields, TypedTime, described_body, errors, parse_form_time
+from app.web.requests import SINCE, FormFields, TypedTime, described_body, errors, parse_form_time
 from app.web.routes.alarm_history import read_figures_of
 
 # The query of the shift report: of which time it is.
@@ -343,7 +343,9 @@ def now() -> float:
 
 router = APIRouter()
 
-MESSAGE_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "text": {"maxLength": LONGEST_MESSAGE}})
+MESSAGE_FORM: Final = FormFields(
+    {"id": {"pattern": PRESS_ID}, "text": {"maxLength": LONGEST_MESSAGE}, "_since": SINCE}
+)
 MESSAGES_READ: Final = 20  # of two shifts, the newest
 
 
@@ -382,7 +384,12 @@ async def report(
     path = f"/alarms/report?{query}"
     page = FramedPage("alarm-report.html", word("report_title"), path, "alarms")
     refused = said_of(form.act, [state.fleet.first.shift_acts])
-    texts = {"word": word, "log_word": log_word, "refused_message": refused}
+    texts = {
+        "word": word,
+        "log_word": log_word,
+        "refused_message": refused,
+        "typed_message": refused_form(request, state).typed.get("text", ""),
+    }
     return framed_page(request, state, page, {**context, **texts})
 
 

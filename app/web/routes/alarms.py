@@ -280,7 +280,7 @@ def _page(request: Request, state: AppState, query: AlarmQuery) -> Response:
 )
 async def acknowledge(request: Request, state: CurrentState) -> Response:
     is_form, content = await act_body_of(request, ACKNOWLEDGE_FORM, FORM_FIELDS_MOST)
-    sent = sent_with(request, state, AcknowledgeBody, content, is_form, _shown_alarms)
+    sent = sent_with(request, state, AcknowledgeBody, ACKNOWLEDGE_FORM, content, is_form, _shown_alarms)
     acts = {
         alarm: AlarmActBody(
             occurrence=occurrence, at=sent.body.at, id=sent.body.id, seen=sent.body.seen
@@ -315,7 +315,7 @@ async def act(alarm: AlarmId, act: AlarmAct, request: Request, state: CurrentSta
         confirmed, asked = await confirmed_act(request, state, alarm, act, content)
         if asked is not None:
             return asked
-    sent = sent_with(request, state, AlarmActBody, content, is_form)
+    sent = sent_with(request, state, AlarmActBody, ACT_FORM, content, is_form)
     pairs = await _run(sent, act, {alarm: sent.body}, confirmed)
     return _answer(sent, pairs, receipt_json(alarm, *pairs[0][1]))
 

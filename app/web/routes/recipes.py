@@ -30,9 +30,18 @@ from app.cell.recipes.recipe import (
 )
 from app.cell.session.session import RobotSession
 from app.panel.base import ID
+from app.panel.widgets.families import Input
 from app.system.errors import InputError, NotFound
 from app.system.texts import TextLike, number, say
-from app.web.acts import ActBody, act_responses, said_of, sent_with
+from app.web.acts import (
+    ActBody,
+    UnreadableEntry,
+    act_responses,
+    entered_again,
+    refused_form,
+    said_of,
+    sent_with,
+)
 from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.caller import caller_of
@@ -60,6 +69,16 @@ from app.web.routes.confirm import checked_entry, entered_fields
 router = APIRouter()
 
 WORDS: Final = {"create": "new", "save": "save"}  # of acts whose word has another name
+# What the page shows for the form of an act.
+FORMS: Final[Mapping[str, Mode]] = {
+    "create": "new",
+    "save": "edit",
+    "copy": "copy",
+    "rename": "rename",
+    "restore": "history",
+    "delete": "delete",
+    "import": "csv",
+}
 
 
 SetId = Annotated[str, Path(pattern=ID, description="the id of a [[recipe]]")]
@@ -275,8 +294,10 @@ async def page(
     if (its := _session_of(state, session, set)) is not session:
         return RedirectResponse(f"{its.base}/recipes/{set}", status_code=303)
     loads = session.panel.recipe_loads
-    said = said_of(query.act, [session.recipe_acts])
-    context = recipes_context(book, loads, session.robot, query.recipe, query.mode, said)
+    refused = refused_form(request, state)
+    said = refused.reason or said_of(query.act, [session.recipe_acts])
+    about = (query.recipe, query.mode, said, refused.typed)
+    context = recipes_context(book, loads, session.robot, *about)
     chosen = context["chosen"]
     shown = chosen.id if chosen else ""
     path = f"/recipes/{set}?{urlencode({'recipe': shown, 'mode': context['mode']})}"
@@ -320,7 +341,11 @@ async def act(
     is_form, content = await act_body_of(request, ACT_FORM, files=FILES)
     entered = entered_fields(content) if is_form else {}
     read_form = partial(_form_body, book, act, caller_of(request).language)
-    sent = sent_with(request, state, RecipeActBody, content, is_form, read_form)
+    try:
+        sent = sent_with(request, state, RecipeActBody, ACT_FORM, content, is_form, read_form)
+    except UnreadableEntry as error:
+        page = _form_page(session, set, act, content.get("-recipe", ""))
+        return entered_again(request, state, page, ACT_FORM.typed(content), error.text)
     body, confirmed, read = sent.body, None, await _read(book, act, sent.body)
     if is_form:
         if read and body.seen != seen_of(book, body.csv, body.decimal):
@@ -380,7 +405,7 @@ def _form_body(book: RecipeBook, act: str, language: str, form: Mapping[str, str
             own[key] = int(own[key])
     typed = {key: value for key, value in form.items() if key in known}
     if act in ("save", "create"):
-        own["values"] = {key: known[key].parse_text(text, language) for key, text in typed.items()}
+        own["values"] = {key: _entry(known[key], text, language) for key, text in typed.items()}
     if act in ("create", "copy", "rename"):
         own.setdefault("name", "")
     if act == "import":
@@ -389,6 +414,13 @@ def _form_body(book: RecipeBook, act: str, language: str, form: Mapping[str, str
         if key not in known and key != "_since" and key.removeprefix("-") not in OWN_FIELDS:
             raise InputError(f'the form has an unknown field "{key:.40}"')
     return own
+
+
+def _entry(field: Input, text: str, language: str) -> Any:
+    try:
+        return field.parse_text(text, language)
+    except InputError as error:
+        raise UnreadableEntry(error.text) from None
 
 
 async def _read(book: RecipeBook, act: str, body: RecipeActBody) -> Mapping[str, Any]:
@@ -402,11 +434,20 @@ async def _read(book: RecipeBook, act: str, body: RecipeActBody) -> Mapping[str,
 
 
 def _shown(session: RobotSession, book: RecipeBook, body: RecipeActBody, receipt: ActReceipt) -> str:
-    """The page of the set after an act, with the recipe that it shows."""
+    """The page of the set after an act, with the recipe that it shows; the form again if it was
+    refused."""
+    if not receipt.done:
+        return _form_page(session, book.load.id, receipt.act, body.recipe)
     recipe = body.recipe
-    if receipt.done and receipt.act in ("create", "copy"):
+    if receipt.act in ("create", "copy"):
         name = clean_name(body.name or "").casefold()
         recipe = next((r.id for r in book.recipes if r.name.casefold() == name), recipe)
     path = f"{session.base}/recipes/{book.load.id}"
-    is_gone = receipt.done and receipt.act == "delete"
+    is_gone = receipt.act == "delete"
     return f"{path}?{urlencode({'recipe': recipe})}" if recipe and not is_gone else path
+
+
+def _form_page(session: RobotSession, set_id: str, act: str, recipe: str) -> str:
+    """The page with the form of an act."""
+    query = {"recipe": recipe} if recipe else {}
+    return f"{session.base}/recipes/{set_id}?{urlencode({**query, 'mode': FORMS[act]})}"

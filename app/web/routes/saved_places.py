@@ -1,6 +1,7 @@
 """The places that operators save for an input: their page, and the acts on them. JSON for programs,
 forms for the page."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, TypedDict
 from urllib.parse import urlencode
 
@@ -27,7 +28,7 @@ from app.panel.places import Place
 from app.panel.widgets.place import MAX_TEXT, PlaceInput
 from app.system.errors import InputError, NotFound
 from app.system.texts import Text, TextLike, say
-from app.web.acts import ActBody, act_responses, said_of, sent_act
+from app.web.acts import ActBody, act_responses, refused_form, said_of, sent_act
 from app.web.answers import ActAnswer
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.caller import caller_of
@@ -100,6 +101,7 @@ class PlacesContext(TypedDict):
     count: Text
     chosen: Place | None
     facts: list[CardRow]
+    typed_name: str
     value: str
     version: str
     lock: TextLike
@@ -115,9 +117,14 @@ def word(name: str, /, **about: Any) -> Text:
 
 
 def places_context(
-    session: RobotSession, widget: PlaceInput, query: PlacesQuery, lock: TextLike, said: TextLike
+    session: RobotSession,
+    widget: PlaceInput,
+    query: PlacesQuery,
+    lock: TextLike,
+    said: TextLike,
+    typed: Mapping[str, str],
 ) -> PlacesContext:
-    """What the page shows now."""
+    """What the page shows now; `typed` is what a refused form had."""
     places = places_of(session)
     saved = places.file.saved
     own = saved.of_robot(places.robot.id)
@@ -140,6 +147,7 @@ def places_context(
         count=word("count", count=str(len(saved.places)), most=str(MAX_SAVED)),
         chosen=chosen,
         facts=facts,
+        typed_name=typed.get("name", ""),
         value=query.value,
         version=version,
         lock=lock,
@@ -204,7 +212,8 @@ async def page(
     needs = {PLACE_ACTS["save"].needs, *needs_of_places(state.fleet.panel, widget)}
     role = role_verdict(needs, caller_of(request).principal)
     said = said_of(query.act, [its.place_acts.runner] if its.place_acts else ())
-    context = places_context(its, chosen, query, (role.reason or "") if role else "", said)
+    lock, typed = (role.reason or "") if role else "", refused_form(request, state).typed
+    context = places_context(its, chosen, query, lock, said, typed)
     shown = query.model_dump(exclude_defaults=True, include={"mode", "value", "place"})
     path = f"/places/{widget}" + (f"?{urlencode(shown)}" if shown else "")
     robot = its.entry.id if its.entry else ""

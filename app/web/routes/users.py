@@ -17,18 +17,17 @@ from app.cell.people.secrets_hash import LONGEST, WAYS, new_api_token
 from app.cell.people.users import LONGEST_NAME
 from app.panel.roles import ROLES
 from app.system.texts import TextLike
-from app.web.acts import ActBody, act_responses, said_of, sent_act
+from app.web.acts import ActBody, act_responses, refused_form, said_of, sent_act
 from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
 from app.web.large_answers import rows_answer
 from app.web.pages.context import FramedPage, framed_page
-from app.web.pages.users_page import Mode, users_context, word
+from app.web.pages.users_page import GROUP, Mode, users_context, word
 from app.web.requests import PAGE, SINCE, FormFields, described_body, errors
 
 router = APIRouter()
 
-GROUP: Final = "group-"  # stands before the id of a group in a form
 UserAct = Annotated[str, Path(json_schema_extra={"enum": list(USER_ACTS)})]
 UserName = Annotated[str, Field(max_length=LONGEST_NAME)]
 Secret = Annotated[str, Field(max_length=LONGEST, json_schema_extra={"format": "password"})]
@@ -188,9 +187,9 @@ def _page(
     said = said or said_of(query.act, [runner])
     if receipt and receipt.done and receipt.act == TOKEN and not token:
         said = word("token_gone")
-    refused = runner.request(query.act) if receipt and not receipt.done else None
+    typed = refused_form(request, state).typed
     rules, who = state.fleet.panel.access, caller_of(request).principal
-    about = (rules.groups, who, query.name, query.tokens, query.mode, said, refused, token)
+    about = (rules.groups, who, query.name, query.tokens, query.mode, said, typed, token)
     context = {**users_context(state.access, *about), "word": word}
     page = FramedPage("users.html", word("title"), "/users")
     return framed_page(request, state, page, context)
