@@ -118,6 +118,15 @@ def result_age(
 
 def _dated(text: TextLike, wall: float) -> TextLike:
     """The text, with its time if it does not say it itself."""
-    if isinstance(text, Text) and any(name == "time" for name, _ in text.params):
-        return text
-    return say("result_at", said=text, time=format_time(wall))
+    return text if _says_time(text) else say("result_at", said=text, time=format_time(wall))
+
+
+def _says_time(text: object) -> bool:
+    """Whether a result says when it was: in its sentence, in one of several, or in the one that a
+    further text follows, such as the robot's reply."""
+    if not isinstance(text, Text):
+        return False
+    about = dict(text.params)
+    parts = about.get("parts", ())
+    several = parts if isinstance(parts, tuple) else ()
+    return "time" in about or _says_time(about.get("said")) or any(map(_says_time, several))

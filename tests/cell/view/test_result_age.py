@@ -1,14 +1,19 @@
 """The result of a press looks old after some seconds, and goes."""
 
 import math
+import re
+from collections.abc import Callable
 from typing import Any, Final
 
 import pytest
 
+from app.cell.commands.services import with_reply
+from app.cell.permission.roles import BY_ONE
 from app.cell.view.times import AGED_S, BAD_S, GOOD_S, result_age
 from app.cell.view.view import build_view
 from app.records.entry import CommandStatus, CommandStatuses, OutcomeCode
-from app.system.texts import say
+from app.system.texts import Text, TextLike, joined, say
+from app.system.texts.catalogue import ENGLISH, sentences
 from tests.support.builders import NOW, panel_of, robot_there
 from tests.support.words import english
 
@@ -47,10 +52,34 @@ def test_a_result_ages_and_goes_in_every_browser(outcome: OutcomeCode, kept_s: f
     assert (view["result"], view["outcome"], view["aged"]) == ("", "", False)
 
 
-def test_a_text_that_has_its_time_gets_no_second_one() -> None:
-    text = say("published", topic="/light", time="14:02:11")
-    view = shown(CommandStatus(outcome="published", text=text), AGED_S)
-    assert view["result"] == "Sent at 14:02:11."
+DATED: Final = ("published", "goal_succeeded", "goal_canceled", "goal_aborted", "goal_rejected",
+                "goal_still_in_progress", "cancel_sent", "call_succeeded", "confirmed")  # fmt: skip
+AS_SHOWN: Final[dict[str, Callable[[Text], TextLike]]] = {
+    "alone": lambda text: text,
+    "with_stop": lambda text: with_reply(text, ""),
+    "with_reply": lambda text: with_reply(text, "pallet full"),
+    "with_reason": lambda text: with_reply(text, say("nav2_goal_occupied", error=206)),
+    "with_person": lambda text: joined((with_reply(text, ""), say(BY_ONE["pin"], user="Sato"))),
+    "not_in_log": lambda text: say("log_not_on_disk", said=text, why="disk full"),
+}
+
+
+@pytest.mark.parametrize("frame", AS_SHOWN)
+@pytest.mark.parametrize("code", DATED)
+def test_a_text_that_has_its_time_gets_no_second_one(code: str, frame: str) -> None:
+    assert "{time}" in sentences(ENGLISH)[code]
+    text = AS_SHOWN[frame](say(code, topic="/light", service="/light", time="14:02:11"))
+    view = shown(CommandStatus(outcome="succeeded", text=text), AGED_S)
+    assert view["aged"]
+    assert re.findall(r"\d\d:\d\d:\d\d", view["result"]) == ["14:02:11"]
+
+
+def test_the_time_of_something_else_is_not_that_of_the_result() -> None:
+    changed = say("recipe_changed_since", name="Carton", by="Sato", time="14:02:11")
+    view = shown(
+        CommandStatus(outcome="unknown", text=say("goal_recovery_failed", why=changed)), AGED_S
+    )
+    assert len(re.findall(r"\d\d:\d\d:\d\d", view["result"])) == 2
 
 
 def test_what_is_under_way_does_not_age() -> None:
