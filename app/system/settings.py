@@ -77,10 +77,15 @@ class Settings:
     without: Annotated[tuple[str, ...], PUBLIC] = ()
 
     def data_folder(self, mode: Mode) -> Path:
-        """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's."""
+        """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's, and a
+        shipped example one apart from other demos."""
         if self.data is not None:
             return self.data
-        return state_home() / APP / "demo" if mode == "demo" else state_home() / APP
+        if mode != "demo":
+            return state_home() / APP
+        examples = {shipped_path(file).resolve(): name for name, file in SHIPPED_PANELS.items()}
+        example = examples.get(self.panel)
+        return state_home() / APP / (f"demo-{example}" if example else "demo")
 
     @classmethod
     def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":

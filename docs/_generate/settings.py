@@ -11,7 +11,7 @@ ABOUT: Final = {
     "DATA": (
         "The folder for the operator's log, alarms, recipes, trends and recordings.",
         "`$XDG_STATE_HOME/operator-panel`, else `~/.local/state/operator-panel`; "
-        "in demo mode its subfolder `demo`",
+        "in demo mode its subfolder `demo`, for the example `mobile-robot` `demo-mobile-robot`",
     ),
     "HOSTS": (
         "More host names under which browsers may open the panel, with commas between them, without "

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.system.errors import SettingsError
-from app.system.settings import PACKAGE, Settings, shipped_path
+from app.system.settings import PACKAGE, SHIPPED_PANELS, Settings, panel_path, shipped_path
 
 
 def test_without_variables_the_shipped_files_are_used() -> None:
@@ -62,6 +62,22 @@ def test_a_demo_keeps_its_data_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert settings.data_folder("demo") == tmp_path / "operator-panel/demo"
     monkeypatch.setenv("XDG_STATE_HOME", "relative")
     assert settings.data_folder("live") == Path.home() / ".local/state/operator-panel"
+
+
+@pytest.mark.parametrize(
+    ("panel", "folder"),
+    [("", "demo"), *((name, f"demo-{name}") for name in SHIPPED_PANELS), ("cell1.toml", "demo")],
+)
+def test_each_shipped_panel_has_a_data_folder_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, panel: str, folder: str
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    settings = Settings.from_environment({"KIOSK_PANEL": panel})
+    assert settings.data_folder("demo") == tmp_path / "operator-panel" / folder
+    assert settings.data_folder("live") == tmp_path / "operator-panel"
+    if panel in SHIPPED_PANELS:  # by its path it is the same panel
+        by_path = Settings.from_environment({"KIOSK_PANEL": str(panel_path(panel))})
+        assert by_path.data_folder("demo") == settings.data_folder("demo")
 
 
 def test_a_path_may_be_relative_or_start_at_home(
