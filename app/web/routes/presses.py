@@ -139,7 +139,8 @@ def _ask(
             **form.fields,
             "_page": shown_on,
             CONFIRMED: "yes",
-            "_seen": page.publisher.id,
+            # What the page showed before the question counts, such as the map of a goal.
+            "_seen": form.fields.get("_seen") or page.publisher.id,
             "_until": str(round(clock.server_now() + QUESTION_LIFE_S, 3)),
             "_since": str(round(clock.server_now(), 3)),
         },
