@@ -46,6 +46,7 @@ from app.panel.widgets.switch import confirms_of
 from app.panel.widgets.templated import is_stop
 from app.system.errors import NotFound
 from app.system.pictures import picture_files, shipped_pictures
+from app.system.texts import PanelText
 from app.system.texts.catalogue import files
 
 # Buttons that are judged as one.
@@ -79,9 +80,14 @@ class Panel(PanelKeys):
         """The languages that a reader can choose: the file's; else those with a catalogue or texts."""
         if self.languages:
             return self.languages
-        texts = [set(text.texts) for _, text in panel_texts(self)]
+        texts = [set(text.texts) for _, text in self.written_texts]
         known = set(files()) & set().union(*texts) if texts else set(files())
         return tuple(tag for tag in files() if tag in known or tag == self.language)
+
+    @cached_property
+    def written_texts(self) -> tuple[tuple[str, PanelText], ...]:
+        """(place in the panel file, text) of every text in several languages."""
+        return tuple(panel_texts(self))
 
     @cached_property
     def picture_files(self) -> dict[str, Path]:

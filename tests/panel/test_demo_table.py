@@ -6,7 +6,7 @@ from typing import Final
 import pytest
 
 from app.panel import load_panel
-from app.panel.file.keys import add_locations, place_of
+from app.panel.file.keys import add_locations, lines_in, path_of, place_of
 from app.system.errors import Fault, PanelError
 
 PANEL: Final = """title = "Cell"
@@ -161,5 +161,6 @@ def test_an_entry_of_a_widget_with_a_fault_is_no_second_fault(tmp_path: Path) ->
 def test_place_with_quotes_has_the_line_of_its_table() -> None:
     place = place_of(("demo", "/a", "ranges", "position[name='b.c']", 0))
     assert place == 'demo."/a".ranges."position[name=\'b.c\']"[0]'
-    (located,) = add_locations([Fault(place, "wrong")], '[demo."/a"]\nhz = 1\n', {})
+    assert path_of(place) == ("demo", "/a", "ranges", "position[name='b.c']", 0)
+    (located,) = add_locations([Fault(place, "wrong")], lines_in('[demo."/a"]\nhz = 1\n'), {})
     assert located.line == 1

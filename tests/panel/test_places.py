@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.panel.file.keys import add_locations, id_at, place_of
+from app.panel.file.keys import add_locations, id_at, lines_in, place_of
 from app.panel.file.toml_lines import Path
 from app.system.errors import Fault, Note
 
@@ -77,13 +77,13 @@ def test_a_path_is_written_as_a_place(path: Path, place: str) -> None:
     ],
 )
 def test_a_place_has_its_id_and_its_line(place: str, where: str) -> None:
-    (fault,) = add_locations([Fault(place, "is wrong")], TEXT, TABLES)
+    (fault,) = add_locations([Fault(place, "is wrong")], lines_in(TEXT), TABLES)
     assert fault.location == where
     assert str(fault) == (f"{where}: is wrong" if where else "is wrong")
 
 
 def test_known_line_is_not_replaced() -> None:
-    (note,) = add_locations([Note("page[0]", "is long", id="mine", line=7)], TEXT, TABLES)
+    (note,) = add_locations([Note("page[0]", "is long", id="mine", line=7)], lines_in(TEXT), TABLES)
     assert str(note) == 'note: page[0] "mine", line 7: is long'
 
 
@@ -101,5 +101,5 @@ def test_an_id_is_no_longer_than_an_id_may_be() -> None:
 
 def test_too_deeply_nested_place_is_reported_without_lines() -> None:
     text = "a = " + "[" * 3000 + "]" * 3000
-    (fault,) = add_locations([Fault("a", "is wrong")], text, {})
+    (fault,) = add_locations([Fault("a", "is wrong")], lines_in(text), {})
     assert fault.line == 0

@@ -114,9 +114,8 @@ def arranged(page: Page, screen: Screen) -> list[list[list[Group]]]:
             rows[-1].append(group)
             left -= group.span
         return [rows]
-    first, *others = groups
-    if screen.is_upright and others:
-        return [[[first], [other]] for other in others]
+    if screen.is_upright and len(groups) > 1:
+        return [[[groups[0]], [other]] for other in groups[1:]]
     return [[[group]] for group in groups]
 
 

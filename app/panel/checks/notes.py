@@ -7,6 +7,7 @@ from typing import Final
 from app.panel.base import Label
 from app.panel.checks.fit import fit_notes
 from app.panel.checks.look import unplaced_notes
+from app.panel.checks.memory import NO_MEMORY, CheckMemory
 from app.panel.checks.panel import untranslated_notes
 from app.panel.checks.robot_texts import robot_text_notes
 from app.panel.checks.state_words import state_word_notes
@@ -76,7 +77,7 @@ def _unit_at(type_name: str, path: str, interfaces: Interfaces) -> str:
 MOVING: Final = (HoldCommand, Action)
 
 
-def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
+def find_notes(panel: Panel, interfaces: Interfaces, memory: CheckMemory = NO_MEMORY) -> Iterator[Note]:
     """All notes with their places in the panel file, without ids and lines."""
     yield from _stop_notes(panel)
     yield from _unbounded_trust_notes(panel)
@@ -92,7 +93,7 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from state_word_notes(panel)
     yield from unit_notes(panel, interfaces)
     yield from fit_notes(panel)
-    yield from cut_notes(panel)
+    yield from cut_notes(panel, memory)
     yield from unplaced_notes(panel)
     yield from untranslated_notes(panel)
 

@@ -2,6 +2,8 @@
 across widgets."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 
 from app.panel.checks.alarms import alarm_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
@@ -12,6 +14,7 @@ from app.panel.checks.look import (
     label_faults,
     page_template_faults,
 )
+from app.panel.checks.memory import NO_MEMORY, CheckMemory
 from app.panel.checks.places import place_faults
 from app.panel.checks.recipes import recipe_faults
 from app.panel.checks.robot_texts import robot_text_faults
@@ -29,11 +32,11 @@ from app.panel.checks.types import ROSOUT
 from app.panel.condition import Condition
 from app.panel.demo import STORIES
 from app.panel.file.wording import closest_name, list_names
+from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.roles import ROLES
 from app.panel.rules import STATE_ID
 from app.panel.template import NOW
-from app.panel.texts import panel_texts
 from app.panel.used import used_names
 from app.panel.widgets.families import (
     BaseWidget,
@@ -181,7 +184,7 @@ def language_faults(panel: Panel) -> Iterator[Fault]:
     if panel.languages and panel.language not in panel.languages:
         message = f'lacks the panel\'s own language, "{panel.language}"'
         yield Fault("languages", message, cause="language")
-    for place, text in panel_texts(panel):
+    for place, text in panel.written_texts:
         for tag in text.texts:
             if tag not in files():
                 message = f"is no language with a catalogue; there is {list_names(files())}"
@@ -194,7 +197,7 @@ def language_faults(panel: Panel) -> Iterator[Fault]:
 def untranslated_notes(panel: Panel) -> Iterator[Note]:
     """Texts that lack a language that other texts of the panel have. A text that is no table is meant
     to be the same in every language."""
-    texts = list(panel_texts(panel))
+    texts = panel.written_texts
     known = {tag for _, text in texts for tag in text.texts}
     wanted = sorted(known & set(panel.languages) if panel.languages else known)
     for place, text in texts:
@@ -203,7 +206,12 @@ def untranslated_notes(panel: Panel) -> Iterator[Note]:
             yield Note(place, f'has no {named}; it is shown in "{panel.language}"')
 
 
-def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
+def find_faults(
+    panel: Panel,
+    interfaces: Interfaces,
+    faulty: Collection[str] = (),
+    memory: CheckMemory = NO_MEMORY,
+) -> Iterator[Fault]:
     """All faults of names, types and templates; at most one for each message.
 
     `faulty` are the ids of widgets whose faults are reported already: checks that depend on them are
@@ -219,11 +227,12 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")
     yield from duplicate_ids("page", [page.id for page in panel.pages])
-    ids, inputs = list(_id_faults(panel)), list(_input_faults(panel, interfaces))
+    checking = _check_context(panel, interfaces)
+    ids, inputs = list(_id_faults(panel)), list(_input_faults(panel, checking))
     yield from (*ids, *inputs)
     reported = [fault.place for fault in (*ids, *inputs)]
     faulty = {*faulty, *_ids_at(panel, reported)}
-    of_widgets = list(_widget_faults(panel, interfaces, faulty))
+    of_widgets = list(_widget_faults(panel, replace(checking, faulty=faulty), memory))
     with_faults = {*faulty, *_ids_at(panel, [fault.place for fault in of_widgets])}
     faults = [
         *condition_faults_of(panel, interfaces),
@@ -328,21 +337,15 @@ def _required_type_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Faul
             return
 
 
-def _check_context(
-    panel: Panel,
-    interfaces: Interfaces,
-    widgets: Sequence[BaseWidget] = (),
-    faulty: Collection[str] = (),
-) -> CheckContext:
-    """The context for the checks of a page's widgets."""
+def _check_context(panel: Panel, interfaces: Interfaces) -> CheckContext:
+    """The context for the checks of widgets that are on no page."""
     return CheckContext(
         interfaces,
-        inputs={w.id: w for w in widgets if isinstance(w, Input)},
+        inputs={},
         all_inputs=[w.id for w in panel.widgets() if isinstance(w, Input)],
         interlocks=[interlock.id for interlock in panel.interlocks],
         conditions={c.id: c.action is not None for c in panel.named_conditions},
         types=panel.subscriptions(),
-        faulty=faulty,
         pages=[page.id for page in panel.pages],
         pictures=panel.shown_pictures,
         alarms={alarm.id: alarm.has_action for alarm in panel.alarms},
@@ -350,33 +353,37 @@ def _check_context(
     )
 
 
-def _input_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    checking = _check_context(panel, interfaces)
+def _input_faults(panel: Panel, checking: CheckContext) -> Iterator[Fault]:
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, Input):
             yield from widget.faults(place, checking)
 
 
-def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
+def _widget_faults(panel: Panel, checking: CheckContext, memory: CheckMemory) -> Iterator[Fault]:
     for p, page in enumerate(panel.pages):
-        checking = _check_context(panel, interfaces, page.widgets, faulty)
-        for place, widget in page.placed():
-            if not isinstance(widget, Input):
-                yield from widget.faults(f"page[{p}].{place}", checking)
-    checking = _check_context(panel, interfaces, (), faulty)
-    yield from _frame_faults(panel, checking, faulty)
+        inputs = {widget.id: widget for widget in page.widgets if isinstance(widget, Input)}
+        on_page = replace(checking, inputs=inputs)
+        faults = partial(_faults_on_page, f"page[{p}]", page, on_page)
+        yield from memory.results("widgets", p, page, (on_page,), faults)
+    yield from _frame_faults(panel, checking)
     yield from figure_faults(panel, checking)
     if panel.state:
         yield from panel.state.display.faults("state", checking)
     yield from recipe_faults(panel.recipes, panel.recipe_loads, checking)
 
 
-def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str]) -> Iterator[Fault]:
+def _faults_on_page(at: str, page: Page, checking: CheckContext) -> Iterator[Fault]:
+    for place, widget in page.placed():
+        if not isinstance(widget, Input):
+            yield from widget.faults(f"{at}.{place}", checking)
+
+
+def _frame_faults(panel: Panel, checking: CheckContext) -> Iterator[Fault]:
     for w, widget in enumerate(panel.frame.widgets):
         place = f"frame.widget[{w}]"
         if widget.allowed_in_frame:
             yield from widget.faults(place, checking)
-        elif widget.id not in faulty:
+        elif widget.id not in checking.faulty:
             message = (
                 f'"{widget.kind}" is not for the frame: it has keys of the kinds publish, call and hold'
             )

@@ -2,8 +2,9 @@
 faults."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any, Final, TypeVar, get_args
 
 from pydantic import BaseModel
@@ -126,6 +127,7 @@ _OWNER: Final = re.compile(
     r"(?:^|\.)(page|group|frame|widget|interlock|alarm|robot|source)(?:\[([0-9]+)\])?(?=\.|$)"
 )
 _WITH_ID: Final = ("page", "widget", "interlock", "alarm", "robot", "source")
+_STEP: Final = re.compile(r'"([^"]*)"|([^.\[\]"]+)|\[([0-9]+)\]')
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
 
 # Ends a message about a second table with an id or a name; (1) is the place of the first.
@@ -146,21 +148,41 @@ def place_of(path: Path) -> str:
     return place
 
 
-def add_locations(remarks: Iterable[AnyRemark], text: str, tables: Any) -> Iterator[AnyRemark]:
-    """The remarks with their ids and lines; `tables` is the parsed `text`."""
+def path_of(place: str) -> Path:
+    """`page[0].widget[2].topic` → ("page", 0, "widget", 2, "topic"): the inverse of `place_of`."""
+    return tuple(
+        int(index) if index else quoted or bare for quoted, bare, index in _STEP.findall(place)
+    )
+
+
+LineOf = Callable[[str], int]  # the line of a place, or of the nearest place around it; 0 without one
+
+
+def lines_in(text: str) -> LineOf:
+    """The lines of the places of a text, which is read at the first call."""
     lines: dict[str, int] = {}
-    for path, line in _lines(text).items():
-        lines.setdefault(place_of(path), line)
+
+    def line_of(place: str) -> int:
+        if not lines:
+            for path, line in _lines(text).items():
+                lines.setdefault(place_of(path), line)
+        return _nearest_line(place, lines)
+
+    return line_of
+
+
+def add_locations(remarks: Iterable[AnyRemark], line_of: LineOf, tables: Any) -> Iterator[AnyRemark]:
+    """The remarks with their ids and lines; `tables` is the parsed text."""
     for remark in remarks:
         place = remark.place
-        known = remark.line or _nearest_line(place, lines)
-        message = _FIRST.sub(lambda first: _with_line(first, lines), remark.message)
+        known = remark.line or line_of(place)
+        message = _FIRST.sub(lambda first: _with_line(first, line_of), remark.message)
         yield replace(remark, message=message, id=remark.id or id_at(place, tables), line=known)
 
 
-def _with_line(first: re.Match[str], lines: Mapping[str, int]) -> str:
+def _with_line(first: re.Match[str], line_of: LineOf) -> str:
     """The place of the first of two tables, with its line."""
-    line = _nearest_line(first[1], lines)
+    line = line_of(first[1])
     return f"{first[0]}, line {line}" if line else first[0]
 
 
@@ -228,6 +250,7 @@ class TableKeys:
         return Fault(place_of((*self.path, key) if key else self.path), message)
 
 
+@cache
 def inner_model(model: Model, key: str | int) -> Model | None:
     """The description of a table under `key`; None if the key is no table."""
     for name, about in model.model_fields.items():

@@ -1,6 +1,7 @@
 """Loads a panel file and reports every fault with its place."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -8,11 +9,13 @@ from pydantic import ValidationError
 
 from app.panel.alarm import Alarm
 from app.panel.base import FileContext
+from app.panel.checks.memory import NO_MEMORY, CheckMemory
 from app.panel.checks.panel import find_faults
 from app.panel.checks.robots import duplicate_ids
 from app.panel.constants import resolve_condition
 from app.panel.file.toml_file import TomlFile, parse_toml, read_toml
 from app.panel.file.wording import closest_name
+from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.rules import StateRules
 from app.panel.source import NAME
@@ -48,17 +51,40 @@ class CheckedPanel(NamedTuple):
 
 def check_panel(path: Path) -> CheckedPanel:
     """The checked panel with notes and previews; PanelError as in `load_panel`."""
-    from app.panel.checks.notes import find_notes
-    from app.panel.file.keys import add_locations
+    from app.panel.file.keys import add_locations, lines_in
     from app.panel.file.preview import previews
 
     file = read_toml(path)
     panel = _load(file)
     interfaces = load_interfaces(panel.distro, panel.interfaces)
+    sent = add_locations(previews(panel, interfaces), file.line_of or lines_in(file.text), file.tables)
+    return CheckedPanel(panel, _notes(panel, file), tuple(sent))
+
+
+def _notes(panel: Panel, file: TomlFile, memory: CheckMemory = NO_MEMORY) -> tuple[Note, ...]:
+    from app.panel.checks.notes import find_notes
+    from app.panel.file.keys import add_locations, lines_in
+
+    interfaces = load_interfaces(panel.distro, panel.interfaces)
     own = _with_sources(file.tables).notes if _names_source(file.tables) else []
-    notes = add_locations([*find_notes(panel, interfaces), *own], file.text, file.tables)
-    sent = add_locations(previews(panel, interfaces), file.text, file.tables)
-    return CheckedPanel(panel, tuple(notes), tuple(sent))
+    notes = [*find_notes(panel, interfaces, memory), *own]
+    return tuple(add_locations(notes, file.line_of or lines_in(file.text), file.tables))
+
+
+class PanelChecker:
+    """Checks the versions of one panel file while it is edited. What did not change since the version
+    before is not checked again."""
+
+    def __init__(self) -> None:
+        self._memory = CheckMemory()
+
+    def panel(self, file: TomlFile) -> Panel:
+        """The checked panel; PanelError as in `load_panel`."""
+        return _load(file, self._memory)
+
+    def notes(self, panel: Panel, file: TomlFile) -> tuple[Note, ...]:
+        """The hints about a panel without faults."""
+        return _notes(panel, file, self._memory)
 
 
 def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
@@ -70,7 +96,7 @@ def faults_of_text(text: str, folder: Path) -> tuple[Fault, ...]:
     return ()
 
 
-def _load(file: TomlFile) -> Panel:
+def _load(file: TomlFile, memory: CheckMemory = NO_MEMORY) -> Panel:
     written = {key: value for key, value in file.tables.items() if key not in NOT_WRITTEN}
     if faults := _source_faults(written, file):
         raise PanelError(str(file.path), _sorted_faults(faults, file))
@@ -84,17 +110,19 @@ def _load(file: TomlFile) -> Panel:
     tables = copies.tables if copies else tables
     faults = [Fault(key, "unknown key") for key in NOT_WRITTEN if key in file.tables]
     own = {"revision": file.revision, "copies": frozenset(copies.origins if copies else ())}
+    context = _context(file)
     try:
-        panel = Panel.model_validate(tables | own, context=_context(file))
+        panel = Panel.model_validate(tables | own | memory.known(tables, context), context=context)
     except ValidationError as error:
-        faults += _shape_faults(error, tables | own, _context(file))
+        faults += _shape_faults(error, tables | own, context)
     else:
-        faults += _type_faults(panel)
+        memory.keep(tables, panel, context)
+        faults += _type_faults(panel, memory=memory)
     if faults:
         faults = list(copies.own_faults(faults)) if copies else faults
         moved = {with_sources.at_origin(f): None for f in faults} if with_sources else faults
         raise PanelError(str(file.path), _sorted_faults(moved, file))
-    return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
+    return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces), memory)
 
 
 def _source_faults(tables: dict[str, Any], file: TomlFile) -> list[Fault]:
@@ -142,33 +170,40 @@ def _context(file: TomlFile) -> FileContext:
     return FileContext(file.path.parent, language if isinstance(language, str) else ENGLISH)
 
 
-def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
+def _resolve_constants(panel: Panel, interfaces: Interfaces, memory: CheckMemory) -> Panel:
     """The panel with values in place of constants' names in lamps and interlocks, and with the zones of
     files among its zones."""
 
     def resolved(widgets: Iterable[BaseWidget]) -> tuple[BaseWidget, ...]:
         return tuple(widget.with_constants(interfaces) for widget in widgets)
 
-    pages = []
-    for page in panel.pages:
+    def page_of(page: Page) -> Page:
         groups = [
             group.model_copy(update={"widgets": resolved(group.widgets)}) for group in page.groups
         ]
-        pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
+        return page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)})
+
+    def each(name: str, descriptions: Sequence[Any], resolve: Callable[[Any], Any]) -> tuple[Any, ...]:
+        made = (
+            memory.results(f"resolved {name}", n, table, (interfaces,), partial(map, resolve, (table,)))
+            for n, table in enumerate(descriptions)
+        )
+        return tuple(resolved for (resolved,) in made)
+
+    pages = each("page", panel.pages, page_of)
     frame = panel.frame.model_copy(update={"widgets": resolved(panel.frame.widgets)})
-    interlocks = tuple(resolve_condition(interlock, interfaces) for interlock in panel.interlocks)
-    conditions = tuple(resolve_condition(condition, interfaces) for condition in panel.own_conditions)
+    conditions = partial(resolve_condition, interfaces=interfaces)
     state = panel.state and panel.state.with_constants(interfaces)
     alarms = tuple(_resolve_alarm(alarm, panel.state, interfaces) for alarm in panel.alarms)
     resolved_parts = {
-        "interlocks": interlocks,
-        "own_conditions": conditions,
+        "interlocks": each("interlock", panel.interlocks, conditions),
+        "own_conditions": each("condition", panel.own_conditions, conditions),
         "alarms": alarms,
         "state": state,
         "frame": frame,
         "zones": (*panel.zones, *(zone for read in panel.zones_of_files for zone in read.zones)),
     }
-    return panel.model_copy(update={"pages": tuple(pages), **resolved_parts})
+    return panel.model_copy(update={"pages": pages, **resolved_parts})
 
 
 def _resolve_alarm(alarm: Alarm, state: StateRules | None, interfaces: Interfaces) -> Alarm:
@@ -184,14 +219,16 @@ def _resolve_alarm(alarm: Alarm, state: StateRules | None, interfaces: Interface
     return alarm.model_copy(update=resolved) if resolved else alarm
 
 
-def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
+def _type_faults(
+    panel: Panel, faulty: Collection[str] = (), memory: CheckMemory = NO_MEMORY
+) -> Iterator[Fault]:
     try:
         interfaces = load_interfaces(panel.distro, panel.interfaces)
     except InterfaceError as error:
         at = next((i for i, folder in enumerate(panel.interfaces) if folder == error.source), 0)
         yield Fault(f"interfaces[{at}]", str(error))
         return
-    yield from find_faults(panel, interfaces, faulty)
+    yield from find_faults(panel, interfaces, faulty, memory)
 
 
 # Modules for panels with faults are imported only when needed, for a faster start.
@@ -211,8 +248,8 @@ def _shape_faults(error: ValidationError, tables: dict[str, Any], context: FileC
 
 def _sorted_faults(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
     """One fault for each mistake, with its line, in the order of the file."""
-    from app.panel.file.keys import add_locations
+    from app.panel.file.keys import add_locations, lines_in
     from app.panel.file.shape import merge_duplicates
 
-    merged = add_locations(merge_duplicates(faults), file.text, file.tables)
+    merged = add_locations(merge_duplicates(faults), file.line_of or lines_in(file.text), file.tables)
     return tuple(sorted(merged, key=lambda fault: fault.line))

@@ -257,12 +257,14 @@ PLAIN_MESSAGES: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class TomlFile:
-    """A parsed file; `revision` is a hash of its bytes."""
+    """A parsed file; `revision` is a hash of its bytes. `line_of` has the line of a place where it is
+    known without the text."""
 
     path: Path
     text: str
     tables: dict[str, Any]
     revision: str
+    line_of: Callable[[str], int] | None = None
 
 
 def read_toml(path: Path) -> TomlFile:

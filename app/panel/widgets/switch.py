@@ -107,14 +107,18 @@ class Switch(EntryWidget, CompositeCommand):
 
     def confirm(self, *, on: bool) -> Confirm:
         """What the robot reports when it is on or off."""
+        return self.confirms[0 if on else 1]
+
+    @cached_property
+    def confirms(self) -> tuple[Confirm, Confirm]:
+        """What the robot reports when it is on, and when it is off."""
         source = self.reported
-        return Confirm(
-            topic=source.topic,
-            type=source.type,
-            field=source.field,
-            equals=self.on_value if on else self.off_value,
-            within_s=self.confirm_s,
+        keys = {"topic": source.topic, "type": source.type, "field": source.field}
+        on, off = (
+            Confirm(**keys, equals=value, within_s=self.confirm_s)
+            for value in (self.on_value, self.off_value)
         )
+        return on, off
 
     def position(self, value: Any) -> Position:
         """The position for a reported value; "" for a value of neither."""
@@ -234,6 +238,6 @@ class Switch(EntryWidget, CompositeCommand):
 def confirms_of(command: Command) -> Iterator[Confirm]:
     """What the robot reports after a press of a command, if it is confirmed."""
     if isinstance(command, Switch):
-        yield from (command.confirm(on=on) for on in (True, False))
+        yield from command.confirms
     elif isinstance(command, PublishPress) and command.confirm is not None:
         yield command.confirm

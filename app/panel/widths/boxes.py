@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from app.panel.widgets.tiles import Screen
@@ -65,6 +66,7 @@ def _may_end(sign: str, following: str, part: str) -> bool:
     return (is_full_width(sign) or is_full_width(following)) and following != " "
 
 
+@lru_cache(maxsize=4096)
 def widest_piece(text: str, size: float, fonts: Fonts = SHIPPED, *, bold: bool) -> tuple[str, float]:
     """The part of a text that needs the widest line, and its width."""
     widths = {
@@ -75,6 +77,7 @@ def widest_piece(text: str, size: float, fonts: Fonts = SHIPPED, *, bold: bool) 
     return widest, widths.get(widest, 0.0)
 
 
+@lru_cache(maxsize=4096)
 def line_count(
     text: str,
     width: float,

@@ -2,12 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from typing import Final, NamedTuple
 
 from app.panel.checks.fit import GAP, cell_width, group_width, page_width, row_heights
+from app.panel.checks.memory import NO_MEMORY, CheckMemory
 from app.panel.layout import COLUMNS, Group, Page, is_button
 from app.panel.model import Panel
-from app.panel.widgets.families import KeyCommand
+from app.panel.widgets.displays import Conditions
+from app.panel.widgets.families import Command, KeyCommand
 from app.panel.widgets.tiles import (
     ENTRY_MM,
     GAP_MM,
@@ -52,12 +56,12 @@ class Finding(NamedTuple):
     size: str
 
 
-def cut_notes(panel: Panel) -> Iterator[Note]:
+def cut_notes(panel: Panel, memory: CheckMemory = NO_MEMORY) -> Iterator[Note]:
     """A note for each text that is cut on a screen of the panel, and for each font whose letters
     have no known widths."""
     yield from font_notes(panel)
     needs: dict[tuple[str, str, str], dict[tuple[str, str], list[str]]] = {}
-    for finding in findings(panel):
+    for finding in findings(panel, memory):
         cut, box, key = finding.cut, finding.box, (finding.place, finding.cut.text, finding.language)
         name = f"locked {box.name}" if box.locked and cut.needs.endswith("lines") else box.name
         widths = cut.needs, f"the {name} has {cut.has}"
@@ -79,15 +83,49 @@ def _said(widths: Mapping[tuple[str, str], Iterable[str]]) -> str:
     return "; ".join(parts)
 
 
-def findings(panel: Panel) -> Iterator[Finding]:
+def findings(panel: Panel, memory: CheckMemory = NO_MEMORY) -> Iterator[Finding]:
     """Every text that is cut, for each screen and language."""
-    fonts = fonts_of(panel)
     for size in panel.screens or KIOSK_SCREENS:
         screen = Screen.from_size(size, panel.mm_per_px)
-        for place, box in boxes(panel, screen):
-            for language in panel.readers_languages:
-                if cut := box.cut(language, fonts):
-                    yield Finding(f"{place}.{box.part}", box, language, cut, size)
+        if screen.width < NARROW:
+            continue  # a phone's pages scroll
+        yield from _cut(panel, size, chain(_robot_tabs(panel, screen), _rail(panel, screen)))
+        for p, page in enumerate(panel.pages):
+            depends = screen, _around(panel, page)
+            findings_on_page = partial(_cut_on_page, panel, page, size, screen)
+            kept = memory.results(f"texts at {size}", p, page, depends, findings_on_page)
+            for finding in kept:
+                yield finding._replace(place=f"page[{p}]{finding.place}")
+
+
+def _cut(panel: Panel, size: str, placed: Iterable[tuple[str, Box]]) -> Iterator[Finding]:
+    """The texts that are cut, in each language."""
+    fonts = fonts_of(panel)
+    for place, box in placed:
+        for language in panel.readers_languages:
+            if cut := box.cut(language, fonts):
+                yield Finding(f"{place}.{box.part}", box, language, cut, size)
+
+
+def _cut_on_page(panel: Panel, page: Page, size: str, screen: Screen) -> Iterator[Finding]:
+    """The same, with places below the page's."""
+    yield from _cut(panel, size, _page(panel, page, screen))
+
+
+def _around(panel: Panel, page: Page) -> tuple[object, ...]:
+    """What decides beside a page which of its texts are cut."""
+    commands = [widget for widget in page.widgets if isinstance(widget, Command)]
+    used = {name for widget in commands for name in widget.interlocks}
+    shows = any(isinstance(widget, Conditions) for widget in page.widgets)
+    return (
+        [interlock for interlock in panel.interlocks if interlock.id in used],
+        panel.named_conditions if shows else (),
+        panel.readers_languages,
+        panel.text_size,
+        panel.stop_hint,
+        panel.has_rail,
+        fonts_of(panel),
+    )
 
 
 def boxes(panel: Panel, screen: Screen) -> Placed:
@@ -97,8 +135,7 @@ def boxes(panel: Panel, screen: Screen) -> Placed:
     yield from _robot_tabs(panel, screen)
     yield from _rail(panel, screen)
     for p, page in enumerate(panel.pages):
-        if not page.template:
-            yield from ((f"page[{p}]{place}", box) for place, box in _page(panel, page, screen))
+        yield from ((f"page[{p}]{place}", box) for place, box in _page(panel, page, screen))
 
 
 def _robot_tabs(panel: Panel, screen: Screen) -> Placed:
@@ -136,6 +173,9 @@ def _rail(panel: Panel, screen: Screen) -> Placed:
 
 
 def _page(panel: Panel, page: Page, screen: Screen) -> Placed:
+    """Those of a page, with places below its own; one with a template places them itself."""
+    if page.template:
+        return
     interlocks = {interlock.id: interlock for interlock in panel.interlocks}
     conditions = {entry.id: entry for entry in panel.named_conditions}
     own = 1 if page.own else 0
