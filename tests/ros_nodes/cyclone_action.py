@@ -1,24 +1,33 @@
-"""The action server /fibonacci, with goals that run side by side and end as a test wants."""
+"""Action servers, with goals that run side by side and end as a test wants: /fibonacci, and those of
+Nav2 with its own types."""
 
+import json
+import os
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from cyclone_node import Answer, Node, qos_of
 from cyclone_types import (
+    DOCK_ROBOT,
+    FIBONACCI,
+    NAVIGATE_TO_POSE,
     UUID,
+    ActionTypes,
     CancelGoal_Request,
     CancelGoal_Response,
-    Fibonacci_FeedbackMessage,
-    Fibonacci_GetResult_Request,
-    Fibonacci_GetResult_Response,
-    Fibonacci_SendGoal_Request,
-    Fibonacci_SendGoal_Response,
+    Duration,
     GoalInfo,
     GoalStatus,
     GoalStatusArray,
+    Header,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
     Time,
+    plain,
 )
 
 UNKNOWN, ACCEPTED, EXECUTING, CANCELING, SUCCEEDED, CANCELED, ABORTED = range(7)
@@ -26,18 +35,119 @@ ENDS = (SUCCEEDED, CANCELED, ABORTED)
 CANCEL_OK, CANCEL_REFUSED, CANCEL_UNKNOWN_ID, CANCEL_ENDED = range(4)
 EVERY_GOAL = bytes(16)
 
-STATUS_HASH = "RIHS01_6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e"
 FEEDBACK_HASH = "RIHS01_c1de71afd52e49a89c53d8262366884185bc0a02f78ce051c4e46b0a7fe59bb2"
+STATUS_HASH = "RIHS01_6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e"
+
+
+class Work(Protocol):
+    """What a goal does, step by step. Its fields are in the order of the definition."""
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the goal is accepted."""
+
+    @property
+    def is_done(self) -> bool: ...
+
+    def step(self) -> tuple[Any, ...]:
+        """Does a step; the fields of its feedback."""
+
+    def result(self, error: int) -> tuple[Any, ...]:
+        """The fields of the result; `error` is the code with which it is aborted, 0 for none."""
+
+    def shown(self) -> dict[str, Any]:
+        """What a test asks for."""
+
+
+class FibonacciWork:
+    """A goal of order n ends with n + 1 numbers, one more at each step, each published as feedback."""
+
+    def __init__(self, request: Any) -> None:
+        self.order = request.order
+        self.is_valid = self.order >= 0
+        self.sequence = [0, 1][: self.order + 1]
+
+    @property
+    def is_done(self) -> bool:
+        return len(self.sequence) > self.order
+
+    def step(self) -> tuple[Any, ...]:
+        self.sequence.append(self.sequence[-1] + self.sequence[-2])
+        return (self.sequence,)
+
+    def result(self, error: int) -> tuple[Any, ...]:
+        return (self.sequence,)
+
+    def shown(self) -> dict[str, Any]:
+        return {"order": self.order, "sequence": list(self.sequence)}
+
+
+STEPS = 8
+
+
+class Drive:
+    """A drive to a pose: metres are left, one less at each step."""
+
+    is_valid = True
+
+    def __init__(self, request: Any) -> None:
+        self.pose, self.left = request.pose, STEPS
+
+    @property
+    def is_done(self) -> bool:
+        return not self.left
+
+    def step(self) -> tuple[Any, ...]:
+        self.left -= 1
+        here = Pose(Point(float(STEPS - self.left)), Quaternion())
+        at = PoseStamped(Header(Time.at(time.time_ns()), "map"), here)
+        return at, Duration(STEPS - self.left), Duration(self.left), 0, float(self.left)
+
+    def result(self, error: int) -> tuple[Any, ...]:
+        return (error,)
+
+    def shown(self) -> dict[str, Any]:
+        return {"pose": plain(self.pose), "left": self.left}
+
+
+class Docking:
+    """A robot that docks: the states of Nav2, one after the other."""
+
+    is_valid = True
+
+    def __init__(self, request: Any) -> None:
+        self.request, self.state = request, 0
+
+    @property
+    def is_done(self) -> bool:
+        return self.state == 4  # WAIT_FOR_CHARGE
+
+    def step(self) -> tuple[Any, ...]:
+        self.state += 1
+        return self.state, Duration(self.state), 0
+
+    def result(self, error: int) -> tuple[Any, ...]:
+        return not error, error, 0
+
+    def shown(self) -> dict[str, Any]:
+        return {"dock_id": self.request.dock_id, "state": self.state}
+
+
+WORK: dict[str, type[Any]] = {
+    FIBONACCI.name: FibonacciWork,
+    NAVIGATE_TO_POSE.name: Drive,
+    DOCK_ROBOT.name: Docking,
+}
 
 
 @dataclass
 class Goal:
     id: bytes
-    order: int
+    work: Work
     accepted_ns: int
     status: int = ACCEPTED
-    sequence: list[int] = field(default_factory=list)
     ending: int = UNKNOWN
+    error: int = 0
     ended_at_s: float = 0.0
     waiting: list[Answer] = field(default_factory=list)
 
@@ -45,15 +155,12 @@ class Goal:
     def info(self) -> GoalInfo:
         return GoalInfo(UUID(list(self.id)), Time.at(self.accepted_ns))
 
-    @property
-    def result(self) -> Fibonacci_GetResult_Response:
-        return Fibonacci_GetResult_Response(self.status, self.sequence)
 
+class ActionServer:
+    """The server of an action, with the types of its definition."""
 
-class Fibonacci:
-    """A goal of order n ends with n + 1 numbers, one more at each step, each published as feedback."""
-
-    def __init__(self, node: Node, name: str = "/fibonacci") -> None:
+    def __init__(self, node: Node, name: str, types: ActionTypes) -> None:
+        self._types = types
         self.step_s = 0.05
         self.refuse_cancels = ""  # as "rclcpp" does, with its return code, or as "rclpy", with 0
         self.answer_goals = True
@@ -61,15 +168,15 @@ class Fibonacci:
         self._goals: dict[bytes, Goal] = {}
         self._changed = threading.Condition()
         for service, request, response, handler in (
-            ("send_goal", Fibonacci_SendGoal_Request, Fibonacci_SendGoal_Response, self._send_goal),
-            ("get_result", Fibonacci_GetResult_Request, Fibonacci_GetResult_Response, self._get_result),
+            ("send_goal", types.send_goal, types.accepted, self._send_goal),
+            ("get_result", types.get_result, types.result, self._get_result),
             ("cancel_goal", CancelGoal_Request, CancelGoal_Response, self._cancel_goal),
         ):
             node.serve(f"{name}/_action/{service}", request, response, handler)
         self._feedback = node.advertise(
             f"{name}/_action/feedback",
-            Fibonacci_FeedbackMessage,
-            qos_of(user_data=f"typehash={FEEDBACK_HASH};"),
+            types.feedback,
+            qos_of(user_data=f"typehash={_hash_of(types.name)};"),
         )
         self._status = node.advertise(
             f"{name}/_action/status",
@@ -89,12 +196,12 @@ class Fibonacci:
     def goals(self) -> list[dict[str, Any]]:
         with self._changed:
             return [
-                {"id": g.id.hex(), "order": g.order, "status": g.status, "sequence": list(g.sequence)}
-                for g in self._goals.values()
+                {"id": g.id.hex(), "status": g.status, **g.work.shown()} for g in self._goals.values()
             ]
 
-    def end(self, status: int, goal: str = "") -> int:
-        """The robot itself ends a goal, or all that run; how many these were."""
+    def end(self, status: int, goal: str = "", error: int = 0) -> int:
+        """The robot itself ends a goal, or all that run; how many these were. `error` is the code in
+        the result."""
         with self._changed:
             running = [
                 g for g in self._goals.values() if g.status not in ENDS and goal in ("", g.id.hex())
@@ -102,31 +209,35 @@ class Fibonacci:
             for g in running:
                 if status == CANCELED:
                     self._move(g, CANCELING)
-                g.ending = status
+                g.ending, g.error = status, error
             self._changed.notify_all()
             return len(running)
 
-    def _send_goal(self, request: Fibonacci_SendGoal_Request, answer: Answer) -> None:
+    def _send_goal(self, request: Any, answer: Answer) -> None:
         with self._changed:
             self._forget_old()
-            goal = Goal(bytes(request.goal_id.uuid), request.order, time.time_ns())
-            accepted = goal.order >= 0 and goal.id not in self._goals
+            work = WORK[self._types.name](request)
+            goal = Goal(bytes(request.goal_id.uuid), work, time.time_ns())
+            accepted = work.is_valid and goal.id not in self._goals
             if accepted:
                 self._goals[goal.id] = goal
                 self._tell_status()
         if self.answer_goals:
-            answer(Fibonacci_SendGoal_Response(accepted, Time.at(goal.accepted_ns)))
+            answer(self._types.accepted(accepted, Time.at(goal.accepted_ns)))
         if accepted:
             threading.Thread(target=self._execute, args=(goal,), daemon=True).start()
 
-    def _get_result(self, request: Fibonacci_GetResult_Request, answer: Answer) -> None:
+    def _get_result(self, request: Any, answer: Answer) -> None:
         with self._changed:
             self._forget_old()
             goal = self._goals.get(bytes(request.goal_id.uuid))
             if goal is not None and goal.status not in ENDS:
                 goal.waiting.append(answer)
                 return
-        answer(goal.result if goal else Fibonacci_GetResult_Response(UNKNOWN, []))
+        answer(self._result_of(goal) if goal else self._types.no_result(UNKNOWN))
+
+    def _result_of(self, goal: Goal) -> Any:
+        return self._types.result(goal.status, *goal.work.result(goal.error))
 
     def _cancel_goal(self, request: CancelGoal_Request, answer: Answer) -> None:
         wanted, before = bytes(request.goal_info.goal_id.uuid), request.goal_info.stamp.nanoseconds
@@ -155,14 +266,12 @@ class Fibonacci:
         with self._changed:
             if goal.ending == UNKNOWN:
                 self._move(goal, EXECUTING)
-            goal.sequence = [0, 1][: goal.order + 1]
-            while len(goal.sequence) <= goal.order and self._step(goal):
-                goal.sequence.append(goal.sequence[-1] + goal.sequence[-2])
-                self._feedback.write(Fibonacci_FeedbackMessage(UUID(list(goal.id)), goal.sequence))
+            while not goal.work.is_done and self._step(goal):
+                self._feedback.write(self._types.feedback(UUID(list(goal.id)), *goal.work.step()))
             goal.ended_at_s = time.monotonic()
             self._move(goal, goal.ending or SUCCEEDED)
         for answer in goal.waiting:
-            answer(goal.result)
+            answer(self._result_of(goal))
 
     def _step(self, goal: Goal) -> bool:
         """Waits for one step; whether the goal goes on."""
@@ -186,3 +295,9 @@ class Fibonacci:
         for goal in list(self._goals.values()):
             if goal.status in ENDS and goal.ended_at_s < oldest:
                 del self._goals[goal.id]
+
+
+def _hash_of(action: str) -> str:
+    """The type hash of an action's feedback, as ROS 2 computes it of the definition."""
+    hashes: dict[str, str] = json.loads(os.environ.get("TYPE_HASHES", "{}"))
+    return hashes.get(f"{action}_FeedbackMessage", FEEDBACK_HASH)

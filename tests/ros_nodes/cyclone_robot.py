@@ -13,10 +13,13 @@ import time
 from typing import Any
 
 from commands import obey
-from cyclone_action import ABORTED, CANCELED, Fibonacci
+from cyclone_action import ABORTED, CANCELED, ActionServer
 from cyclone_node import Answer, Node, publishers, qos_of, subscribers
 from cyclone_parameters import Parameters
 from cyclone_types import (
+    DOCK_ROBOT,
+    FIBONACCI,
+    NAVIGATE_TO_POSE,
     AddTwoInts_Request,
     AddTwoInts_Response,
     Bool,
@@ -60,6 +63,7 @@ TOPIC_TYPES: dict[str, tuple[type, str]] = {
         "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
     ),
 }
+NAV2 = {"/navigate_to_pose": NAVIGATE_TO_POSE, "/dock_robot": DOCK_ROBOT}
 HEADER = ("guid", "sequence_number", "structure_needs_at_least_one_member")
 
 
@@ -78,7 +82,8 @@ class Commands:
         self._node.serve("/add_two_ints", AddTwoInts_Request, AddTwoInts_Response, self._on_add)
         for slow in ("/slow", "/slow_2", "/slow_3"):
             self._node.serve(slow, Trigger_Request, Trigger_Response, self._on_slow)
-        self._fibonacci = Fibonacci(self._node)
+        self._fibonacci = ActionServer(self._node, "/fibonacci", FIBONACCI)
+        self._nav2: dict[str, ActionServer] = {}
         self._parameters = Parameters(self._node)
         self._node.start()
 
@@ -108,6 +113,22 @@ class Commands:
 
     def cancel(self, goal: str = "") -> int:
         return self._fibonacci.end(CANCELED, goal)
+
+    def serve_nav2(self, step_s: float) -> None:
+        """Offers /navigate_to_pose and /dock_robot, with the types of Nav2."""
+        for name, types in NAV2.items():
+            self._nav2[name] = ActionServer(self._node, name, types)
+            self._nav2[name].configure(step_s=step_s)
+        self._node.tell()
+
+    def step_nav2(self, name: str, step_s: float) -> None:
+        self._nav2[name].configure(step_s=step_s)
+
+    def goals_of_nav2(self, name: str) -> list[dict[str, Any]]:
+        return self._nav2[name].goals()
+
+    def abort_nav2(self, name: str, error: int) -> int:
+        return self._nav2[name].end(ABORTED, error=error)
 
     def parameters(self) -> dict[str, Any]:
         return self._parameters.values()

@@ -14,10 +14,12 @@ from cyclonedds.idl.types import (
     float32,
     float64,
     int8,
+    int16,
     int32,
     int64,
     sequence,
     uint8,
+    uint16,
     uint32,
     uint64,
 )
@@ -81,7 +83,13 @@ class Time(IdlStruct, typename=dds_name("builtin_interfaces/msg/Time")):
         return cls(*divmod(nanoseconds, 10**9))
 
 
-# Transforms.
+@dataclass
+class Duration(IdlStruct, typename=dds_name("builtin_interfaces/msg/Duration")):
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+# Poses and transforms.
 
 
 @dataclass
@@ -103,6 +111,25 @@ class Quaternion(IdlStruct, typename=dds_name("geometry_msgs/msg/Quaternion")):
     y: float64 = 0.0
     z: float64 = 0.0
     w: float64 = 1.0
+
+
+@dataclass
+class Point(IdlStruct, typename=dds_name("geometry_msgs/msg/Point")):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Pose(IdlStruct, typename=dds_name("geometry_msgs/msg/Pose")):
+    position: Point
+    orientation: Quaternion
+
+
+@dataclass
+class PoseStamped(IdlStruct, typename=dds_name("geometry_msgs/msg/PoseStamped")):
+    header: Header
+    pose: Pose
 
 
 @dataclass
@@ -232,36 +259,79 @@ class CancelGoal_Response(IdlStruct, typename=dds_name("action_msgs/srv/CancelGo
     goals_canceling: sequence[GoalInfo]
 
 
-FIBONACCI = "example_interfaces/action/Fibonacci"
+@dataclass(frozen=True)
+class ActionTypes:
+    """The types of an action on the wire, made of the fields of its goal, result and feedback."""
+
+    name: str
+    send_goal: type[IdlStruct]
+    accepted: type[IdlStruct]
+    get_result: type[IdlStruct]
+    result: type[IdlStruct]
+    feedback: type[IdlStruct]
+    empty: tuple[Any, ...]
+
+    def no_result(self, status: int) -> Any:
+        """The result of a goal that is not known."""
+        return self.result(status, *self.empty)
 
 
-@dataclass
-class Fibonacci_SendGoal_Request(IdlStruct, typename=dds_name(f"{FIBONACCI}_SendGoal_Request")):
-    goal_id: UUID
-    order: int32
+def action_types(
+    name: str,
+    goal: dict[str, Any],
+    result: dict[str, Any],
+    feedback: dict[str, Any],
+    empty: tuple[Any, ...],
+) -> ActionTypes:
+    """`empty` are the values of a result that says nothing."""
+    package, kind, short = name.split("/")
+
+    def part(suffix: str, fields: dict[str, Any]) -> type[IdlStruct]:
+        own = f"{short}_{suffix}"
+        return make_idl_struct(own, dds_name(f"{package}/{kind}/{own}"), fields)
+
+    return ActionTypes(
+        name,
+        part("SendGoal_Request", {"goal_id": UUID, **goal}),
+        part("SendGoal_Response", {"accepted": bool, "stamp": Time}),
+        part("GetResult_Request", {"goal_id": UUID}),
+        part("GetResult_Response", {"status": int8, **result}),
+        part("FeedbackMessage", {"goal_id": UUID, **feedback}),
+        empty,
+    )
 
 
-@dataclass
-class Fibonacci_SendGoal_Response(IdlStruct, typename=dds_name(f"{FIBONACCI}_SendGoal_Response")):
-    accepted: bool
-    stamp: Time
-
-
-@dataclass
-class Fibonacci_GetResult_Request(IdlStruct, typename=dds_name(f"{FIBONACCI}_GetResult_Request")):
-    goal_id: UUID
-
-
-@dataclass
-class Fibonacci_GetResult_Response(IdlStruct, typename=dds_name(f"{FIBONACCI}_GetResult_Response")):
-    status: int8
-    sequence: sequence[int32]
-
-
-@dataclass
-class Fibonacci_FeedbackMessage(IdlStruct, typename=dds_name(f"{FIBONACCI}_FeedbackMessage")):
-    goal_id: UUID
-    sequence: sequence[int32]
+NUMBERS = {"sequence": sequence[int32]}
+FIBONACCI = action_types(
+    "example_interfaces/action/Fibonacci", {"order": int32}, NUMBERS, NUMBERS, ([],)
+)
+NAVIGATE_TO_POSE = action_types(
+    "nav2_msgs/action/NavigateToPose",
+    {"pose": PoseStamped, "behavior_tree": str},
+    {"error_code": uint16},
+    {
+        "current_pose": PoseStamped,
+        "navigation_time": Duration,
+        "estimated_time_remaining": Duration,
+        "number_of_recoveries": int16,
+        "distance_remaining": float32,
+    },
+    (0,),
+)
+DOCK_ROBOT = action_types(
+    "nav2_msgs/action/DockRobot",
+    {
+        "use_dock_id": bool,
+        "dock_id": str,
+        "dock_pose": PoseStamped,
+        "dock_type": str,
+        "max_staging_time": float32,
+        "navigate_to_staging_pose": bool,
+    },
+    {"success": bool, "error_code": uint16, "num_retries": uint16},
+    {"state": uint16, "docking_time": Duration, "num_retries": uint16},
+    (False, 0, 0),
+)
 
 
 # Parameters.

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 import pytest
 import zenoh
@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from app.ros.messages import load_interfaces
 from tests.support import domains
-from tests.support.parts import ROS_PYTHON, TESTS, Bridge, until
+from tests.support.parts import ROOT, ROS_PYTHON, TESTS, Bridge, until
 from tests.support.processes.commanded import Commanded
 
 NODE = "cyclone_robot"
@@ -102,10 +102,19 @@ def type_store() -> Any:
 TYPES = type_store()
 
 
+NAV2: Final = ROOT / "docs/examples/mobile-robot/interfaces"
+NAV2_ACTIONS: Final = ("nav2_msgs/action/NavigateToPose", "nav2_msgs/action/DockRobot")
+PARTS_OF_ACTIONS: Final = (
+    *("SendGoal_Request", "SendGoal_Response", "GetResult_Request", "GetResult_Response"),
+    "FeedbackMessage",
+)
+
+
 def type_hashes() -> dict[str, str]:
-    """The type hash of each request and response."""
-    interfaces = load_interfaces("jazzy")
-    parts = (f"{name}_{part}" for name in DEFINITIONS for part in ("Request", "Response"))
+    """The type hash of each request and response, and of the parts of Nav2's actions."""
+    interfaces = load_interfaces("jazzy", (NAV2,))
+    parts = [f"{name}_{part}" for name in DEFINITIONS for part in ("Request", "Response")]
+    parts += [f"{name}_{part}" for name in NAV2_ACTIONS for part in PARTS_OF_ACTIONS]
     return {name: interfaces.type_hash(name) for name in parts}
 
 
