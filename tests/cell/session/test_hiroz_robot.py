@@ -2,19 +2,23 @@
 attachments and type hashes are its own (`tests/rmw_crate/`)."""
 
 import asyncio
+import io
+import math
 import signal
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
+from PIL import Image
 
 from app.cell.session.session import RobotSession
 from tests.cell.session.test_rmw_zenoh import asked, enabled, link, session_with
 from tests.support.builders import ENABLED, GUARDED, MESSAGE, panel_of, press_widget
 from tests.support.parts import Process, until
 from tests.support.rmw import RmwNode, Router
+from tests.support.servers import live_server
 from tests.support.waiting import when
 
 pytestmark = pytest.mark.promise("dialects")
@@ -66,6 +70,26 @@ def robot(hiroz: Path, router: Router) -> Iterator[Process]:
     assert mine.running, mine.text
     yield mine
     mine.end(signal.SIGKILL)
+
+
+DRIVEN: Final = """
+title = "Shuttle"
+dialect = "rmw_zenoh"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "hall"
+kind = "map"
+label = "Hall"
+max_age_s = 1.0
+[[page.widget.layer]]
+shows = "scan"
+topic = "/scan"
+max_age_s = 1.0
+"""
+CELL_M: Final = 0.1
+LEFT, TOP = -2.0, 2.0  # of the map, in metres
 
 
 def shown(session: RobotSession, widget: str) -> Any:
@@ -120,3 +144,39 @@ def test_it_sees_the_panel_and_its_death_is_seen(router: Router, robot: Process)
             await asked(other.end)
 
     asyncio.run(scene())
+
+
+def test_its_map_transforms_at_50_hz_and_scan_at_10_hz_fit_each_other(
+    router: Router, robot: Process, tmp_path: Path
+) -> None:
+    """Where the robot stands, and where its beams end, are the cells that it says."""
+    with live_server(router, tmp_path, DRIVEN) as kiosk:
+
+        def is_placed() -> bool:
+            hall = kiosk.widget("hall")
+            return (
+                hall["state"] == "live" and bool(hall["grid"]) and bool(hall["layer_0"].get("points"))
+            )
+
+        until(is_placed, "the robot and its scan are on the map")
+        hall = kiosk.widget("hall")
+        x, y, yaw = hall["pose"]
+        assert (x, y) == (1.25, -0.5)
+        assert yaw == pytest.approx(math.pi / 2, abs=0.01)
+        assert hall["layer_note"] == ""
+        ends = sorted(zip(*[iter(hall["layer_0"]["points"])] * 2, strict=True))
+        assert ends == [(25, -50), (125, -150), (125, 50), (225, -50)]  # cm
+        grid = hall["grid"]
+        assert (grid["width"], grid["height"], grid["x"], grid["y"]) == (40, 40, LEFT, -2.0)
+        picture = kiosk.http.get(f"/widgets/hall/map/{grid['version']}/0-0.png").content
+        tile = Image.open(io.BytesIO(picture)).convert("RGB")
+
+        def colour_at(x_m: float, y_m: float) -> Any:
+            return tile.getpixel((int((x_m - LEFT) / CELL_M), int((TOP - y_m) / CELL_M)))
+
+        assert colour_at(x, y) == colour_at(0.0, 0.0)  # free floor
+        assert colour_at(1.95, y) != colour_at(x, y)  # the wall, seven cells to the right
+        assert colour_at(1.85, y) == colour_at(x, y)
+        robot.send(signal.SIGKILL)
+        until(lambda: kiosk.widget("hall")["state"] == "old", "without transforms it is old")
+        assert kiosk.widget("hall")["pose"] == [x, y, yaw]

@@ -1,19 +1,27 @@
 //! A robot for the tests, on hiroz: keys, tokens, attachments and hashes are those of its makers.
 //!
 //! `test-rmw-robot ENDPOINT [DOMAIN]` runs until it is killed. It permits operation, says back what it
-//! hears, adds two numbers, counts Fibonacci's and has one parameter.
+//! hears, adds two numbers, counts Fibonacci's and has one parameter. It is on a map, with transforms at
+//! 50 Hz and a scan at 10 Hz.
 
-use std::time::Duration;
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use hiroz::action::server::ExecutingGoal;
 use hiroz::context::ZContextBuilder;
 use hiroz::parameter::{IntegerRange, ParameterDescriptor, ParameterType, ParameterValue};
 use hiroz::qos::{QosDurability, QosHistory, QosProfile};
+use hiroz::node::ZNode;
 use hiroz::{Builder, Result};
+use hiroz_msgs::builtin_interfaces::Time;
 use hiroz_msgs::example_interfaces::action::Fibonacci;
 use hiroz_msgs::example_interfaces::srv::AddTwoInts;
 use hiroz_msgs::example_interfaces::{AddTwoIntsResponse, FibonacciFeedback, FibonacciResult};
-use hiroz_msgs::std_msgs::{Bool, String as Text};
+use hiroz_msgs::geometry_msgs::{Point, Pose, Quaternion, Transform, TransformStamped, Vector3};
+use hiroz_msgs::nav_msgs::{MapMetaData, OccupancyGrid};
+use hiroz_msgs::sensor_msgs::LaserScan;
+use hiroz_msgs::std_msgs::{Bool, Header, String as Text};
+use hiroz_msgs::tf2_msgs::TFMessage;
 
 async fn count(goal: ExecutingGoal<Fibonacci>) {
     let mut sequence = vec![0, 1];
@@ -27,6 +35,67 @@ async fn count(goal: ExecutingGoal<Fibonacci>) {
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
     goal.succeed(FibonacciResult { sequence }).expect("succeeded");
+}
+
+const SIDE: usize = 40;
+const CELL: f32 = 0.1; // m
+const FORWARD: Quaternion = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
+const LEFT: Quaternion = Quaternion { x: 0.0, y: 0.0, z: FRAC_1_SQRT_2, w: FRAC_1_SQRT_2 };
+
+fn header(frame: &str) -> Header {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("a time after 1970");
+    let stamp = Time { sec: now.as_secs() as i32, nanosec: now.subsec_nanos() };
+    Header { stamp, frame_id: frame.into() }
+}
+
+fn transform(parent: &str, child: &str, x: f64, y: f64, rotation: Quaternion) -> TFMessage {
+    let transform = Transform { translation: Vector3 { x, y, z: 0.0 }, rotation };
+    let stamped =
+        TransformStamped { header: header(parent), child_frame_id: child.into(), transform };
+    TFMessage { transforms: vec![stamped] }
+}
+
+/// Free floor with one wall, the column at its right edge.
+fn map() -> OccupancyGrid {
+    let origin = Pose { position: Point { x: -2.0, y: -2.0, z: 0.0 }, orientation: FORWARD };
+    let (width, height) = (SIDE as u32, SIDE as u32);
+    let info = MapMetaData { map_load_time: Time::default(), resolution: CELL, width, height, origin };
+    let data = (0..SIDE * SIDE).map(|n| if n % SIDE == SIDE - 1 { 100 } else { 0 }).collect();
+    OccupancyGrid { header: header("map"), info, data }
+}
+
+/// Beams to the front, the left, the back and the right, 1 m long.
+fn scan() -> LaserScan {
+    LaserScan {
+        header: header("base_link"),
+        angle_increment: std::f32::consts::FRAC_PI_2,
+        range_min: 0.1,
+        range_max: 9.0,
+        ranges: vec![1.0; 4],
+        ..LaserScan::default()
+    }
+}
+
+/// The robot stands at x = 1.25, y = -0.5 and looks to y.
+fn stand(node: &ZNode, latched: QosProfile) -> Result<()> {
+    let grid = node.create_pub::<OccupancyGrid>("/map").with_qos(latched).build()?;
+    let fixed = node.create_pub::<TFMessage>("/tf_static").with_qos(latched).build()?;
+    let moved = node.create_pub::<TFMessage>("/tf").build()?;
+    let scanned = node.create_pub::<LaserScan>("/scan").build()?;
+    grid.publish(&map())?;
+    fixed.publish(&transform("map", "odom", 0.5, 0.0, FORWARD))?;
+    tokio::spawn(async move {
+        let _latched = (grid, fixed); // they keep what late subscribers ask for
+        let mut ticks = tokio::time::interval(Duration::from_millis(20));
+        for tick in 0_u64.. {
+            ticks.tick().await;
+            moved.publish(&transform("odom", "base_link", 0.75, -0.5, LEFT)).expect("published");
+            if tick % 5 == 0 {
+                scanned.publish(&scan()).expect("published");
+            }
+        }
+    });
+    Ok(())
 }
 
 #[tokio::main]
@@ -60,6 +129,8 @@ async fn main() -> Result<()> {
             request.reply_blocking(&AddTwoIntsResponse { sum }).expect("replied");
         }
     });
+
+    stand(&node, latched)?;
 
     let heard = node.create_sub::<Text>("/operation").build()?;
     let last = node.create_pub::<Text>("/last_heard").build()?;
