@@ -178,3 +178,90 @@ def test_layers_are_placed_by_transforms_and_a_costmap_takes_its_updates(
             until(lambda: layer(2)["state"] == "old", "an update outside of it is named")
     finally:
         nav.end()
+
+
+FLEET: Final = """
+title = "Hall 3"
+[[robot]]
+id = "left"
+name = "Shuttle 1"
+namespace = "/left"
+[[robot]]
+id = "middle"
+name = "Shuttle 2"
+namespace = "/middle"
+[[robot]]
+id = "right"
+name = "Shuttle 3"
+namespace = "/right"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "hall"
+kind = "map"
+label = "Hall"
+robots = "all"
+max_age_s = 2.0
+"""
+PLACES: Final = {"left": 1.0, "middle": 2.0, "right": 3.0}
+
+
+def test_several_robots_of_one_map_each_with_its_own_age(own_bridge: Bridge, tmp_path: Path) -> None:
+    nodes = {name: RosNode(own_bridge.domain, f"{name}_driver") for name in PLACES}
+    try:
+        for name, node in nodes.items():
+            node.advertise(f"/{name}/map", GRID, durability="transient_local", depth=1)
+            node.advertise(f"/{name}/pose", POSE)
+            origin = {"position": {"x": -1.0, "y": -1.0, "z": 0.0}, "orientation": UPRIGHT}
+            info = {"resolution": 0.5, "width": 10, "height": 4, "origin": origin}
+            node.publish(
+                f"/{name}/map", {"header": {"frame_id": "map"}, "info": info, "data": [0] * 40}
+            )
+        with live_server(own_bridge, tmp_path, FLEET + WITH_TOPIC) as kiosk:
+
+            def drive(*names: str) -> None:
+                for name in names:
+                    pose = {"position": {"x": PLACES[name], "y": 0.0, "z": 0.0}, "orientation": UPRIGHT}
+                    nodes[name].publish(f"/{name}/pose", {"header": {"frame_id": "map"}, "pose": pose})
+
+            def rows(own: str) -> dict[str, tuple[str, list[float] | None]]:
+                """The other robots on a robot's map: their states and poses."""
+                shown = kiosk.robot(own).widget("hall")["robots"]
+                return {row["robot"]: (row["state"], row["pose"]) for row in shown}
+
+            def on_map(name: str, state: str) -> tuple[str, list[float]]:
+                return state, [PLACES[name], 0.0, 0.0]
+
+            def all_live() -> bool:
+                drive(*PLACES)
+                return all(
+                    rows(own) == {name: on_map(name, "live") for name in PLACES if name != own}
+                    for own in PLACES
+                )
+
+            until(all_live, "each map has the other two, where they are")
+
+            def middle_is_old() -> bool:
+                drive("left", "right")
+                return rows("left")["middle"][0] == "old"
+
+            until(middle_is_old, "the robot that stopped is old")
+            drive("left", "right")
+            for own, other in (("left", "right"), ("right", "left")):
+                assert rows(own) == {
+                    "middle": on_map("middle", "old"),  # it is drawn where it was
+                    other: on_map(other, "live"),
+                }
+            (stopped,) = (
+                row for row in kiosk.robot("left").widget("hall")["robots"] if row["robot"] == "middle"
+            )
+            assert stopped["label"].startswith("Shuttle 2, "), stopped
+            assert rows("middle") == {name: on_map(name, "live") for name in ("left", "right")}
+            assert kiosk.robot("middle").widget("hall")["state"] == "old"
+            nodes["right"].end()  # a node that is gone
+            until(lambda: rows("left")["right"][0] == "old", "the robot whose node ended is old")
+            assert kiosk.robot("left").widget("hall")["robots_note"] == ""
+    finally:
+        for node in nodes.values():
+            node.end()
