@@ -1,0 +1,379 @@
+"""What is on the robot, for the list beside the page that is edited: topics with their newest values,
+services, actions and parameters, and where the panel uses each. It only reads from the robot."""
+
+import asyncio
+import logging
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Final, Literal, get_args
+
+from app.panel import Panel
+from app.panel.demo import STORIES
+from app.panel.widgets.families import BaseWidget, Command, DisplayWidget
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.parts import parts_of
+from app.ros.graph.model import (
+    EndpointQos,
+    GraphSnapshot,
+    RobotGraph,
+    Server,
+    SurveyedTopic,
+    TopicEndpoint,
+)
+from app.ros.graph.node_services import NodeParameter, NodeServices
+from app.ros.messages import Interfaces, load_interfaces
+from app.ros.messages.validation import format_value
+from app.system.errors import DecodeError, KioskError
+from app.system.texts import TextLike, say
+from app.tools.cli.robot.link import Place, opened
+from app.tools.cli.robot.topic_reader import endpoint_for
+from app.tools.editor.suggestions import Item, Suggestions, suggestions_for
+from app.tools.scaffold.draft import SERVICES_OF_EVERY_NODE, public_topics
+from app.tools.scaffold.parts import shown_fields
+from app.tools.scaffold.widgets import DIAGNOSTICS, JOINTS, PICTURES
+
+log = logging.getLogger("kiosk.editor")
+
+READ_EVERY_S: Final = 2.0  # the graph
+WATCHED_S: Final = 6.0  # after the last look of a browser
+AGAIN_S: Final = 2.0  # after a link that was lost
+PARAMETERS_EVERY_S: Final = 30.0
+MOST_LISTENED: Final = 1_000
+LARGEST: Final = 20_000  # bytes of a message whose value is shown
+ARRIVALS: Final = 4  # of a topic, by which its period is known
+MAX_TEXT: Final = 24  # characters of a value
+# Types whose messages are large or have no value that a line can show.
+NOT_LISTENED: Final = frozenset(
+    (
+        *PICTURES,
+        *("sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud", "sensor_msgs/msg/LaserScan"),
+        *("nav_msgs/msg/OccupancyGrid", "map_msgs/msg/OccupancyGridUpdate", "nav_msgs/msg/Path"),
+        *("tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"),
+    )
+)
+Section = Literal["topics", "services", "actions", "parameters"]
+SECTIONS: Final[Sequence[Section]] = get_args(Section)
+# The key by which a command names what it acts on.
+NAME_KEYS: Final[Mapping[Section, str]] = {
+    "topics": "topic",
+    "services": "service",
+    "actions": "action",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the list. `key` is its name in the list's section; `value` is what it is now, "" if
+    that is not known. `used` says where the panel has it; empty: nowhere."""
+
+    key: str
+    name: str
+    type: str
+    nodes: str
+    value: TextLike
+    used: Sequence[TextLike]
+
+    def matches(self, words: str) -> bool:
+        """Whether each of the words is in its name, its type or its nodes."""
+        text = f"{self.name} {self.type} {self.nodes}".lower()
+        return all(word in text for word in words.lower().split())
+
+
+@dataclass(slots=True)
+class Latest:
+    """The newest message of a topic, as bytes, and when the last ones arrived."""
+
+    payload: bytes = b""
+    arrivals: list[float] = field(default_factory=list)
+
+    @property
+    def period_s(self) -> float | None:
+        """The longest time between the last messages; None of a topic with few of them."""
+        if len(self.arrivals) < ARRIVALS:
+            return None
+        return max(after - before for before, after in pairwise(self.arrivals))
+
+
+class RobotList:
+    """Reads the robot while a browser shows the list. Used on the event loop."""
+
+    def __init__(self, place: Callable[[], Awaitable[Place | None]]) -> None:
+        """`place`: where the robot is now; None while there is none."""
+        self._place = place
+        self._looked = -WATCHED_S
+        self._wake = asyncio.Event()
+        self.fault: str = ""  # why there is no robot
+        self.robot: RobotGraph | None = None
+        self._below = ""
+        self._latest: dict[str, Latest] = {}
+        self._parameters: dict[str, NodeParameter] = {}
+
+    def look(self) -> None:
+        """A browser shows the list now."""
+        self._looked = asyncio.get_running_loop().time()
+        self._wake.set()
+
+    @property
+    def _is_watched(self) -> bool:
+        return asyncio.get_running_loop().time() - self._looked < WATCHED_S
+
+    async def run(self) -> None:
+        """Until it is cancelled."""
+        while True:
+            self._wake.clear()
+            if not self._is_watched:
+                await self._wake.wait()
+            try:
+                place = await self._place()
+                if place is not None:
+                    await self._read(place)
+            except KioskError as error:
+                self.fault, self.robot = str(error), None
+            with suppress(TimeoutError):
+                async with asyncio.timeout(AGAIN_S):
+                    await self._wake.wait()
+
+    async def _read(self, place: Place) -> None:
+        """Reads the graph and the topics of one place until nobody looks, or it is another place."""
+        interfaces = load_interfaces(place.distro, place.interfaces)
+        async with opened(place) as (observer, graph):
+            services: asyncio.Task[None] | None = None
+            topics: asyncio.Task[None] | None = None
+            listened: frozenset[str] = frozenset()
+            read_at = -PARAMETERS_EVERY_S
+            try:
+                while self._is_watched and await self._place() == place:
+                    self.robot, self.fault = fullest(graph), ""
+                    self._below = place.namespace.removeprefix(self.robot.namespace)
+                    now = asyncio.get_running_loop().time()
+                    if (services is None or services.done()) and now - read_at > PARAMETERS_EVERY_S:
+                        read_at = now
+                        nodes = NodeServices(self.robot, interfaces, observer)
+                        services = asyncio.create_task(self._read_parameters(nodes, self.robot))
+                    wanted = frozenset(topic.key for topic in self._listened(interfaces))
+                    if wanted != listened or topics is None or topics.done():
+                        if topics is not None:
+                            topics.cancel()
+                        listened = wanted
+                        topics = asyncio.create_task(self._listen(place, interfaces))
+                    await asyncio.sleep(READ_EVERY_S)
+                    graph = await observer.observe()
+            finally:
+                for task in filter(None, (services, topics)):
+                    task.cancel()
+                await asyncio.gather(*filter(None, (services, topics)), return_exceptions=True)
+
+    def _listened(self, interfaces: Interfaces) -> list[SurveyedTopic]:
+        topics = self.robot.topics if self.robot else ()
+        shown = (
+            topic
+            for topic in public_topics(topics)
+            if topic.publishers
+            and topic.type in interfaces.structures
+            and topic.type not in NOT_LISTENED
+        )
+        return list(shown)[:MOST_LISTENED]
+
+    async def _listen(self, place: Place, interfaces: Interfaces) -> None:
+        """By a session of its own: its subscriptions are declared once."""
+        wanted = {topic.key: topic for topic in self._listened(interfaces)}
+        if not wanted:
+            return
+        async with opened(place) as (observer, _):
+            own = [endpoint_for(topic, topic.type) for topic in wanted.values()]
+            async for key, sample in observer.listen(own):
+                latest = self._latest.setdefault(wanted[key].name, Latest())
+                payload = bytes(sample.payload)
+                latest.payload = payload if len(payload) <= LARGEST else b""
+                if not sample.cached:
+                    latest.arrivals = [*latest.arrivals[1 - ARRIVALS :], sample.at]
+
+    async def _read_parameters(self, services: NodeServices, robot: RobotGraph) -> None:
+        own = {bridge.node for bridge in robot.bridges}
+        read: dict[str, NodeParameter] = {}
+        for node in robot.nodes:
+            if node.name in own:
+                continue
+            with suppress(KioskError):
+                for parameter in await services.parameters(node) or ():
+                    read[f"{parameter.node} {parameter.name}"] = parameter
+        self._parameters = read
+
+    # The rows.
+
+    def rows(self, panel: Panel | None) -> Mapping[Section, Sequence[Row]]:
+        """All rows by section; of a panel with a story, also what its simulated robot can play."""
+        interfaces = self._interfaces(panel)
+        used = uses_of(panel) if panel else {}
+        rows: dict[Section, list[Row]] = {name: [] for name in SECTIONS}
+        for (section, key), item in self._items(panel).items():
+            value: TextLike = ""
+            if isinstance(item, NodeParameter):
+                nodes, value = item.node, short(item.value)
+            elif isinstance(item, Server):
+                nodes = _names(item.nodes)
+            else:
+                ends = item.publishers or item.subscribers
+                nodes = _names([node for end in ends for node in end.nodes])
+                value = self.value(item, interfaces)
+            places = used.get((section, key), ())
+            rows[section].append(Row(key, item.name, item.type, nodes, value, places))
+        return rows
+
+    def values(self, panel: Panel | None) -> dict[str, TextLike]:
+        """The newest values of topics by their names."""
+        interfaces = self._interfaces(panel)
+        topics = self.robot.topics if self.robot else ()
+        return {
+            topic.name: self.value(topic, interfaces) for topic in topics if topic.name in self._latest
+        }
+
+    def value(self, topic: SurveyedTopic, interfaces: Interfaces) -> TextLike:
+        """The newest value of a topic as a line shows it."""
+        message = self.sample(topic, interfaces)
+        return "" if message is None else value_text(message, topic.type, interfaces)
+
+    def sample(self, topic: SurveyedTopic, interfaces: Interfaces) -> Any:
+        """The newest message of a topic; None without one that can be read."""
+        latest = self._latest.get(topic.name)
+        if latest is None or not latest.payload:
+            return None
+        with suppress(DecodeError, KeyError):
+            return interfaces.decode(topic.type, latest.payload)
+        return None
+
+    def suggestions(self, section: Section, key: str, panel: Panel | None) -> Suggestions | None:
+        """What a panel can have of a row; None if it is gone."""
+        item = self._items(panel).get((section, key))
+        if item is None:
+            return None
+        interfaces = self._interfaces(panel)
+        if not isinstance(item, SurveyedTopic):
+            return suggestions_for(item, interfaces)
+        latest = self._latest.get(item.name, Latest())
+        return suggestions_for(item, interfaces, self.sample(item, interfaces), latest.period_s)
+
+    def _items(self, panel: Panel | None) -> dict[tuple[Section, str], Item]:
+        items: dict[tuple[Section, str], Item] = {}
+        robot = self.robot
+        if robot is not None:
+            for topic in public_topics(robot.topics):
+                items["topics", topic.name] = topic
+            for service in robot.services:
+                if service.name.rpartition("/")[2] not in SERVICES_OF_EVERY_NODE:
+                    items["services", service.name] = service
+            items |= {("actions", action.name): action for action in robot.actions}
+            items |= {("parameters", key): parameter for key, parameter in self._parameters.items()}
+        if panel is not None and panel.demo_story is not None:
+            for section, item in story_items(panel):
+                items.setdefault((section, item.name), item)
+        return items
+
+    def _interfaces(self, panel: Panel | None) -> Interfaces:
+        return (
+            load_interfaces(panel.distro, panel.interfaces) if panel else load_interfaces("jazzy", ())
+        )
+
+
+def fullest(graph: GraphSnapshot) -> RobotGraph:
+    """The robot with the most topics: of several alike, panels have the pages of one."""
+    return max(graph.robots, key=lambda robot: len(robot.topics))
+
+
+def story_items(panel: Panel) -> Iterator[tuple[Section, SurveyedTopic | Server]]:
+    """What the simulated robot plays once a panel uses it."""
+    if panel.demo_story is None:
+        return
+    story = STORIES[panel.demo_story]
+    reliable = EndpointQos(reliable=True)
+    for name, kind in story.publishes.items():
+        end = TopicEndpoint(type=kind, qos=reliable)
+        yield "topics", SurveyedTopic(name=name, key=name.strip("/"), publishers=(end,))
+    for name, kind in story.subscribes.items():
+        end = TopicEndpoint(type=kind, qos=reliable)
+        yield "topics", SurveyedTopic(name=name, key=name.strip("/"), subscribers=(end,))
+    for name, kind in story.services.items():
+        yield "services", Server(name=name, key=name.strip("/"), type=kind)
+    for name, kind in story.actions.items():
+        yield "actions", Server(name=name, key=name.strip("/"), type=kind)
+
+
+def _names(nodes: Sequence[str]) -> str:
+    return ", ".join(sorted({node.rpartition("/")[2] for node in nodes}))
+
+
+# The value of a message in a line.
+
+
+def value_text(message: Any, type_name: str, interfaces: Interfaces) -> TextLike:
+    """ "5.68" of a FluidPressure, "6 joints" of a JointState."""
+    if type_name == JOINTS:
+        return say("editor_joints", count=len(message.name))
+    if type_name == DIAGNOSTICS:
+        return say("editor_entries", count=len(message.status))
+    shown = next(iter(shown_fields(type_name, interfaces)), None)
+    if shown is None:
+        return ""
+    value: Any = message
+    for name in shown.field.split("."):
+        value = getattr(value, name, None)
+    if isinstance(value, float) and shown.scale != 1.0:
+        value *= shown.scale
+    return short(value)
+
+
+def short(value: Any) -> str:
+    """A value in few characters."""
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+    else:
+        text = value if isinstance(value, str) else format_value(value)
+    line = " ".join(text.split())
+    return line if len(line) <= MAX_TEXT else f"{line[: MAX_TEXT - 1]}…"
+
+
+# Where a panel uses what.
+
+
+def uses_of(panel: Panel) -> dict[tuple[Section, str], Sequence[TextLike]]:
+    """(section, name) → the pages that have it, "header", the interlocks."""
+    used: defaultdict[tuple[Section, str], dict[Any, None]] = defaultdict(dict)
+
+    def add(widget: BaseWidget, where: TextLike) -> None:
+        for section, name in _names_of(widget):
+            used[section, name][where] = None
+
+    for page in panel.pages:
+        for widget in page.widgets:
+            add(widget, page.title)
+    for widget in panel.frame.widgets:
+        add(widget, say("editor_frame"))
+    if panel.state:
+        add(panel.state.display, say("editor_header"))
+    locked = [name for widget in panel.commands for name in widget.interlocks]
+    for interlock in panel.interlocks:
+        count = locked.count(interlock.id)
+        used["topics", interlock.topic][say("editor_lock_of", count=count)] = None
+    for condition in panel.own_conditions:
+        used["topics", condition.topic][say("editor_condition")] = None
+    for alarm in panel.alarms:
+        for source in alarm.sources():
+            used["topics", source.topic][say("editor_alarm")] = None
+    return {key: list(places) for key, places in used.items()}
+
+
+def _names_of(widget: BaseWidget) -> Iterator[tuple[Section, str]]:
+    if isinstance(widget, Parameter):
+        yield "parameters", f"{widget.node} {widget.parameter}"
+    if isinstance(widget, DisplayWidget | Command):
+        for source in widget.sources():
+            yield "topics", source.topic
+    for part in parts_of(widget) if isinstance(widget, Command) else ():
+        for section, key in NAME_KEYS.items():
+            if isinstance(name := getattr(part, key, None), str):
+                yield section, name
