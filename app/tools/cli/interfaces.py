@@ -17,15 +17,8 @@ from app.ros.messages.definitions import Structure
 from app.ros.messages.package_copy import Copied, copy_packages, opened_source, write_package
 from app.system.errors import InterfaceError, KioskError
 from app.tools.cli.parser import Parser
-from app.tools.cli.robot.link import (
-    DEFAULT_DISTRO,
-    Place,
-    add_options,
-    ended,
-    opened,
-    place_of,
-    settled_graph,
-)
+from app.tools.cli.robot.options import add_options, ended, place_of
+from app.tools.robot.link import DEFAULT_DISTRO, Place, opened, settled_graph
 
 # The messages of packages as the robot's own nodes describe them, for who has no files of them.
 

@@ -28,9 +28,9 @@ from app.ros.messages import Interfaces, load_interfaces
 from app.ros.messages.validation import format_value
 from app.system.errors import DecodeError, KioskError
 from app.system.texts import TextLike, say
-from app.tools.cli.robot.link import Place, opened
-from app.tools.cli.robot.topic_reader import endpoint_for
 from app.tools.editor.suggestions import Item, Suggestions, suggestions_for
+from app.tools.robot.link import Place, opened
+from app.tools.robot.topic_reader import endpoint_for
 from app.tools.scaffold.draft import SERVICES_OF_EVERY_NODE, public_topics
 from app.tools.scaffold.parts import shown_fields
 from app.tools.scaffold.widgets import DIAGNOSTICS, JOINTS, PICTURES

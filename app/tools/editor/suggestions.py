@@ -66,7 +66,9 @@ def suggestions_for(
         drafts = [*_drafts(item, interfaces, sample, period_s)]
     except InterfaceError as error:
         return Suggestions(why_none=str(error))
-    choices = [choice for draft in drafts if isinstance(draft, DraftWidget) for choice in _of(draft)]
+    choices = [
+        choice for draft in drafts if isinstance(draft, DraftWidget) for choice in _choices(draft)
+    ]
     if isinstance(item, SurveyedTopic) and item.type == BOOL and item.publishers:
         choices.insert(0 if permits(item.name) else len(choices), _interlock(item))
     omitted = [draft.why for draft in drafts if isinstance(draft, Omission)]
@@ -89,7 +91,7 @@ def _drafts(
             yield from widgets.publishers(item, interfaces, has_dds_qos=True)
 
 
-def _of(draft: DraftWidget) -> Iterator[Suggestion]:
+def _choices(draft: DraftWidget) -> Iterator[Suggestion]:
     """The drafted widget, and the others that fit its value."""
     keys = _without_size(draft.keys)
     about: TextLike = ""

@@ -31,7 +31,7 @@ from app.ros.messages.names import Qos
 from app.ros.zenoh.answers import GraphLink
 from app.ros.zenoh.config import config_to
 from app.system.texts import say
-from app.tools.cli.robot.link import GONE
+from app.tools.cli.robot.options import GONE
 from app.tools.cli.robot.scaffold import main as scaffold
 from app.tools.cli.robot.topics import main as topics
 from app.tools.doctor.findings import Report

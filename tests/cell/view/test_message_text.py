@@ -8,7 +8,7 @@ import pytest
 
 from app.cell.view.messages import Shape, csv_line, yaml_text
 from app.ros.messages import load_interfaces
-from app.tools.cli.robot.topic_reader import value_in
+from app.tools.robot.topic_reader import value_in
 
 INTERFACES = load_interfaces("jazzy")
 STATE = "sensor_msgs/msg/JointState"

@@ -10,7 +10,7 @@ import pytest
 from app.panel.model import Panel
 from app.tools.cli.doctor import as_text
 from app.tools.cli.robot.echo import main as echo
-from app.tools.cli.robot.link import GONE
+from app.tools.cli.robot.options import GONE
 from app.tools.cli.robot.scaffold import main as scaffold
 from app.tools.cli.robot.topics import main as topics
 from app.tools.doctor.findings import Report

@@ -12,8 +12,8 @@ from app.panel import Panel, load_panel
 from app.panel.layout import Frame
 from app.system.settings import shipped_path
 from app.system.texts import render
-from app.tools.cli.robot.link import Place
 from app.tools.editor.robot_list import RobotList, Row, short
+from app.tools.robot.link import Place
 from app.tools.simulator.in_process import in_process
 from tests.support.places import SHIPPED
 
@@ -61,11 +61,11 @@ def test_the_list_has_the_robot_with_live_values_and_where_the_panel_uses_them()
         with in_process(panel) as endpoint:
             async with listing(Place(zenoh=ZENOH, connect=(endpoint,))) as robots:
                 await until(robots, lambda: valued(robots, panel, "/air_pressure"))
-                found = valued(robots, panel, "/air_pressure")
-                assert found is not None
-                assert found.type == "sensor_msgs/msg/FluidPressure"
-                assert 3 < float(str(found.value)) < 9  # bar, not Pa
-                assert [render(place, "en") for place in found.used] == ["Cell", "Watch", "alarm"]
+                pressure = valued(robots, panel, "/air_pressure")
+                assert pressure is not None
+                assert pressure.type == "sensor_msgs/msg/FluidPressure"
+                assert 3 < float(str(pressure.value)) < 9  # bar, not Pa
+                assert [render(place, "en") for place in pressure.used] == ["Cell", "Watch", "alarm"]
                 state = row(robots, panel, "topics", "/cell/state")
                 assert state is not None
                 assert "header" in [render(place, "en") for place in state.used]

@@ -9,7 +9,7 @@ import pytest
 
 from app.panel import load_panel
 from app.tools.cli.robot.echo import main as echo
-from app.tools.cli.robot.link import GONE
+from app.tools.cli.robot.options import GONE
 from app.tools.cli.robot.scaffold import main as scaffold
 from app.tools.cli.robot.topics import main as topics
 from app.tools.doctor.findings import Report

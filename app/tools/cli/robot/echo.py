@@ -17,8 +17,9 @@ from app.system.errors import DecodeError
 from app.system.printable import printable
 from app.tools.cli.arguments import seconds, whole_number
 from app.tools.cli.parser import Parser
-from app.tools.cli.robot.link import GONE, add_options, ended, opened, place_of
-from app.tools.cli.robot.topic_reader import TopicReader, value_in
+from app.tools.cli.robot.options import GONE, add_options, ended, place_of
+from app.tools.robot.link import opened
+from app.tools.robot.topic_reader import TopicReader, value_in
 
 PROG = "python -m app.cli echo"
 SEPARATOR = "---"

@@ -17,8 +17,9 @@ from typing import Any, Final
 
 from app.tools.cli.arguments import seconds, whole_number
 from app.tools.cli.parser import Parser
-from app.tools.cli.robot.link import GONE, add_options, ended, opened, place_of
-from app.tools.cli.robot.topic_reader import TopicReader
+from app.tools.cli.robot.options import GONE, add_options, ended, place_of
+from app.tools.robot.link import opened
+from app.tools.robot.topic_reader import TopicReader
 
 PROG = "python -m app.cli hz"
 EVERY_S: Final = 1.0

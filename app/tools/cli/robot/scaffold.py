@@ -33,20 +33,10 @@ from app.system.settings import APP
 from app.tools.cli.arguments import seconds
 from app.tools.cli.output import add_force, check_absent, draft_of
 from app.tools.cli.parser import Parser
-from app.tools.cli.robot.link import (
-    Place,
-    add_options,
-    check_namespace,
-    ended,
-    namespace,
-    nothing_there,
-    opened,
-    place_of,
-    report_lost,
-    settled_graph,
-)
-from app.tools.cli.robot.topic_reader import endpoint_for
+from app.tools.cli.robot.options import add_options, ended, namespace, place_of, report_lost
 from app.tools.doctor.findings import few
+from app.tools.robot.link import Place, check_namespace, nothing_there, opened, settled_graph
+from app.tools.robot.topic_reader import endpoint_for
 from app.tools.scaffold.checked import LeftOut, checked_draft
 from app.tools.scaffold.draft import Known, lost_names, make_draft, public_topics
 from app.tools.scaffold.parts import Draft, label_of, own_labels, shown_fields

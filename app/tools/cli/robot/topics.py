@@ -13,18 +13,8 @@ from typing import Any, Final
 from app.ros.graph.model import Forwarding, RobotGraph, SurveyedTopic, TopicEndpoint, topic_forwarding
 from app.system.printable import one_line
 from app.tools.cli.parser import Parser
-from app.tools.cli.robot.link import (
-    GONE,
-    add_options,
-    check_namespace,
-    ended,
-    nothing_there,
-    opened,
-    place_of,
-    report_lost,
-    settled_graph,
-    shown_topics,
-)
+from app.tools.cli.robot.options import GONE, add_options, ended, place_of, report_lost
+from app.tools.robot.link import check_namespace, nothing_there, opened, settled_graph, shown_topics
 
 PROG = "python -m app.cli topics"
 NOT_FORWARDED: Final[Mapping[Forwarding, str]] = {

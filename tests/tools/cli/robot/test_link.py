@@ -17,10 +17,11 @@ from app.ros.graph.model import (
     TopicEndpoint,
 )
 from app.system.errors import LinkError, PanelError
-from app.tools.cli.robot import topic_reader
 from app.tools.cli.robot.hz import Rate
-from app.tools.cli.robot.link import Place, add_options, place_of, topic_named
-from app.tools.cli.robot.topic_reader import TopicReader
+from app.tools.cli.robot.options import add_options, place_of
+from app.tools.robot import topic_reader
+from app.tools.robot.link import Place, topic_named
+from app.tools.robot.topic_reader import TopicReader
 
 BOOL = "std_msgs/msg/Bool"
 

@@ -16,7 +16,7 @@ from app.ros.graph.model import (
     SurveyedTopic,
     TopicEndpoint,
 )
-from app.tools.cli.robot.link import Place, settled_graph
+from app.tools.robot.link import Place, settled_graph
 
 LONG_S = 60.0
 PLACE = Place(zenoh=Path("zenoh.json5"))

@@ -16,14 +16,7 @@ from app.ros.messages.field_path import Key, field_call, path_steps
 from app.ros.messages.names import Qos
 from app.ros.zenoh.sample import Sample
 from app.system.errors import InterfaceError, LinkError
-from app.tools.cli.robot.link import (
-    Place,
-    full_name,
-    lost_text,
-    settled_graph,
-    shown_topics,
-    topic_named,
-)
+from app.tools.robot.link import Place, full_name, lost_text, settled_graph, shown_topics, topic_named
 
 DEPTH: Final = 100  # of the bridge's reader: no message of a burst is lost
 HOW: Final = "give the folder of its package with --interfaces (a workspace's install/, or its source)"

@@ -1,0 +1,1 @@
+"""The editor of panel files: `operator-panel edit`."""
