@@ -42,6 +42,7 @@ def locked(lock: str) -> set[str]:
 SHIPPED: Final = locked("deploy/requirements.lock")
 EXTRAS: Final = {
     "apsw", "authlib", "joserfc", "numpy", "paho-mqtt", "rosbags", "ruamel-yaml",
+    "tomlrt",
 }  # with the extras only  # fmt: skip
 TESTS: Final = locked("tests/requirements.lock")
 

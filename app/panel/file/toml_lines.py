@@ -1,4 +1,4 @@
-"""The line numbers of the keys and tables of a TOML text, which Python's reader does not provide.
+"""The places of the keys and tables of a TOML text, which Python's reader does not provide.
 
 The text must be valid TOML: nothing is checked here. Source: TOML 1.0.0 (toml.io).
 """
@@ -7,7 +7,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections import Counter
-from typing import Final
+from typing import Final, NamedTuple
 
 Path = tuple[str | int, ...]  # ("page", 0, "widget", 2, "topic")
 
@@ -26,6 +26,32 @@ _VALUE: Final = re.compile(
 )
 
 
+class Span(NamedTuple):
+    """A part of a text, by the offsets of its first character and of the one after its last."""
+
+    start: int
+    end: int
+
+
+class Header(NamedTuple):
+    """The header of a table: `[a.b]`, or `[[a.b]]` (`many`). `path` is that of the table, `span` goes
+    from the first bracket to the last one."""
+
+    path: Path
+    keys: tuple[str, ...]
+    many: bool
+    span: Span
+
+
+class Layout(NamedTuple):
+    """The headers in their order, and the span of each key with its value, or of a list's element. In
+    `pairs` are (table, first part of the key, span) of the keys that are in no value."""
+
+    headers: list[Header]
+    spans: dict[Path, Span]
+    pairs: list[tuple[Path, str, Span]]
+
+
 def lines_of(text: str) -> dict[Path, int]:
     """Path → line (from 1) of every key, table and list element; a table's line is that of its
     header."""
@@ -34,9 +60,16 @@ def lines_of(text: str) -> dict[Path, int]:
     return scanner.lines
 
 
+def layout_of(text: str) -> Layout:
+    scanner = _Scanner(text)
+    scanner.document()
+    return scanner.layout
+
+
 class _Scanner:
     def __init__(self, text: str) -> None:
         self.lines: dict[Path, int] = {}
+        self.layout = Layout([], {}, [])
         self._text = text
         self._at = 0
         self._ends = [match.start() for match in re.finditer("\n", text)]
@@ -48,7 +81,8 @@ class _Scanner:
             if self._text[self._at] == "[":
                 table = self._header()
             else:
-                self._pair(table)
+                path, span = self._pair(table)
+                self.layout.pairs.append((table, str(path[len(table)]), span))
 
     def _peek(self) -> str:
         """The next character after spaces and comments; "" at the end."""
@@ -68,9 +102,10 @@ class _Scanner:
 
     def _header(self) -> Path:
         """The path of the table that a header opens: `[a.b]`, or the next one of `[[a.b]]`."""
-        line, many = self._line(), self._text.startswith("[[", self._at)
+        line, many, start = self._line(), self._text.startswith("[[", self._at), self._at
         self._at += 2 if many else 1
-        *above, last = self._key()
+        keys = self._key()
+        *above, last = keys
         self._at += 2 if many else 1
         path: Path = ()
         for part in above:
@@ -82,6 +117,7 @@ class _Scanner:
             self._tables[path] += 1
             path = self._newest(path)
         self.lines[path] = line
+        self.layout.headers.append(Header(path, tuple(keys), many, Span(start, self._at)))
         return path
 
     def _newest(self, path: Path) -> Path:
@@ -99,8 +135,8 @@ class _Scanner:
                 self._match(_SPACE)
                 return parts
 
-    def _pair(self, table: Path) -> None:
-        line = self._line()
+    def _pair(self, table: Path) -> tuple[Path, Span]:
+        line, start = self._line(), self._at
         path = table
         for part in self._key():
             path = (*path, part)
@@ -108,6 +144,13 @@ class _Scanner:
         self._at += len("=")
         self._peek()
         self._value(path)
+        span = self._span(start)
+        self.layout.spans[path] = span
+        return path, span
+
+    def _span(self, start: int) -> Span:
+        """From `start` to here, without the spaces before this place."""
+        return Span(start, start + len(self._text[start : self._at].rstrip()))
 
     def _value(self, path: Path) -> None:
         match self._text[self._at]:
@@ -123,7 +166,9 @@ class _Scanner:
         index = 0
         while self._peek() != "]":
             self.lines[*path, index] = self._line()
+            start = self._at
             self._value((*path, index))
+            self.layout.spans[*path, index] = self._span(start)
             index += 1
             self._comma()
         self._at += 1
