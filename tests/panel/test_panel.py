@@ -306,7 +306,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (
             with_widget(1, message={"data": "{massage}"}),
             f"{BUTTON}.message.data",
-            'no input "massage"; there is message',
+            'no input "massage"; did you mean "message"?',
         ),
         (
             with_widget(1, message={"data": "{message"}),

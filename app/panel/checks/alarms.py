@@ -17,7 +17,7 @@ from app.panel.alarm import (
 from app.panel.checks.conditions import condition_faults
 from app.panel.checks.types import entry_faults, field_faults, number_faults, type_fault
 from app.panel.fault_catalogue import CatalogueError, read_catalogue
-from app.panel.file.wording import closest_name, list_names, no_such
+from app.panel.file.wording import closest_name, known_hint, list_names, no_such
 from app.panel.model import Panel
 from app.panel.robot_panels import widget_robots
 from app.panel.shared_keys import number_key_faults
@@ -119,7 +119,8 @@ def _state_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
     if not known:
         yield Fault(place, "is a state of the header: the panel has no [state]", cause=cause)
     elif not any(same_value(value, alarm.state) for value in known):
-        message = f"no state {format_value(alarm.state)}; there is {list_names(map(str, known))}"
+        hint = known_hint(str(alarm.state), map(str, known))
+        message = f"no state {format_value(alarm.state)}; {hint}"
         yield Fault(place, message, cause=cause)
 
 

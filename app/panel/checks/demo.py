@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 from app.panel.constants import mismatch_at
 from app.panel.demo import DemoEntry
 from app.panel.file.keys import place_of
-from app.panel.file.wording import closest_name, list_names
+from app.panel.file.wording import closest_name, known_hint, list_names
 from app.panel.model import Panel
 from app.panel.numbers import NUMBERS
 from app.panel.used import used_names
@@ -138,7 +138,7 @@ def _field_faults(
         yield from _range_faults(f"{place}.range", path, kind, entry.range or ())
     for path, limits in entry.ranges.items():
         if path not in numbers:
-            message = f"the panel shows no number at {path}; there is {list_names(numbers)}"
+            message = f"the panel shows no number at {path}; {known_hint(path, numbers)}"
             yield Fault(f"{place}.ranges", message)
         else:
             yield from _range_faults(f"{place}.ranges", path, numbers[path], limits)
@@ -162,7 +162,7 @@ def _parameter_faults(
     for name, value in entry.parameters.items():
         at = f"{place}.parameters"
         if name not in known:
-            message = f"the panel has no parameter {name} of {node}; there is {list_names(known)}"
+            message = f"the panel has no parameter {name} of {node}; {known_hint(name, known)}"
             yield Fault(at, message)
             continue
         widget = known[name]

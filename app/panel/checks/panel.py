@@ -31,7 +31,7 @@ from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
 from app.panel.condition import Condition
 from app.panel.demo import STORIES
-from app.panel.file.wording import closest_name, list_names
+from app.panel.file.wording import closest_name, known_hint, list_names
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.roles import ROLES
@@ -405,7 +405,8 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
     known = panel.subscriptions()
     for t, topic in enumerate((panel.record and panel.record.topics) or ()):
         if topic not in known:
-            message = f"{topic} is no topic that this panel listens to; there is {list_names(known)}"
+            hint = known_hint(topic, known)
+            message = f"{topic} is no topic that this panel listens to; {hint}"
             yield Fault(f"record.topics[{t}]", message, cause=f"listens {topic}")
 
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from app.panel.base import Description
 from app.panel.checks.types import field_faults, way_faults
-from app.panel.file.wording import list_names, no_such
+from app.panel.file.wording import known_hint, list_names, no_such
 from app.panel.numbers import NUMBERS
 from app.panel.recipe import ParameterKind, RecipeReadback, RecipeSet
 from app.panel.widgets.families import CheckContext, Command, Input
@@ -153,7 +153,7 @@ def _name_faults(
 ) -> Iterator[Fault]:
     for name in names:
         if name not in fields:
-            message = f"is not one of the recipe's fields; there is {list_names(fields)}"
+            message = f"is not one of the recipe's fields; {known_hint(name, fields)}"
             yield Fault(f"{place}.{key}.{name}", message)
     missing = [name for name in fields if name not in names]
     if missing:

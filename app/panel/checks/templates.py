@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from app.panel.file.wording import list_names, no_such
+from app.panel.file.wording import known_hint, no_such
 from app.panel.template import NOW, TIME, add_now, fill, input_of, placeholders, value_at
 from app.panel.widgets.families import CheckContext, Input
 from app.ros.messages import Interfaces
@@ -54,12 +54,9 @@ def unknown_input_faults(
         if name == NOW:
             continue
         if input_id not in inputs:
-            message = (
-                f"; there is {list_names(sorted(inputs))}"
-                if input_id not in checking.all_inputs
-                else ON_OTHER_PAGE
-            )
-            message = f'no input "{input_id}"{message}'
+            elsewhere = input_id in checking.all_inputs
+            hint = ON_OTHER_PAGE if elsewhere else f"; {known_hint(input_id, sorted(inputs))}"
+            message = f'no input "{input_id}"{hint}'
             yield Fault(f"{place}.{where}", message, cause=f"input {input_id}")
         elif input_id not in checking.faulty and (fault := _part_fault(inputs[input_id], part)):
             yield Fault(f"{place}.{where}", fault)

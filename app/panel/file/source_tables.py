@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from app.panel.alarm import LIMIT_KEYS
 from app.panel.condition import COMPARISONS, Condition
 from app.panel.file.keys import inner_model, known_keys
-from app.panel.file.wording import list_names
+from app.panel.file.wording import known_hint
 from app.panel.model import Panel
 from app.panel.numbers import Scaling, sent_number
 from app.panel.source import NAME, Source, reads_source
@@ -83,7 +83,7 @@ class _Walk:
     def _with_source(self, table: dict[str, Any], model: type[BaseModel], place: str) -> dict[str, Any]:
         name = table.pop(NAME)
         if not isinstance(name, str) or name not in self._sources:
-            there = f"; there is {list_names(sorted(self._sources))}" if self._sources else ""
+            there = f"; {known_hint(str(name), sorted(self._sources))}" if self._sources else ""
             message = f"no source {format_value(name)}{there or f': write a [[{NAME}]] with this id'}"
             self._made.faults.append(Fault(f"{place}.{NAME}", message))
             return table

@@ -142,10 +142,14 @@ def closest_name(name: str, known: Iterable[str]) -> str:
 
 def no_such(kind: str, name: str, known: Iterable[str], where: str = "") -> str:
     """The message about a name of nothing that the panel has."""
+    return f'no {kind} "{name}"{where}; {known_hint(name, known)}'
+
+
+def known_hint(name: str, known: Iterable[str]) -> str:
+    """Which name of the known ones is meant, or all of them."""
     names = list(known)
     meant = closest_name(name, names)
-    hint = f'did you mean "{meant}"?' if meant else f"there is {list_names(names)}"
-    return f'no {kind} "{name}"{where}; {hint}'
+    return f'did you mean "{meant}"?' if meant else f"there is {list_names(names)}"
 
 
 def one_of(known: list[str], value: Any) -> str:
