@@ -27,7 +27,7 @@ MAX_POINTS: Final = 10_000  # of all zones of a file
 MAX_ID: Final = 2**53
 LEAST_RING: Final = 4  # positions, of which the last is the first
 COLLECTION: Final = '{"type": "FeatureCollection", "features": […]}'
-ZONE_KEYS: Final = ("label", "kind", "yaw", "map_version")  # properties of a feature
+ZONE_KEYS: Final = ("label", "kind", "yaw", "level", "map_version")  # properties of a feature
 LINES: Final = ("LineString", "MultiLineString")
 
 Point = tuple[float, float]

@@ -331,7 +331,7 @@ class Panel(PanelKeys):
         read = []
         for table in self.zone_files:
             context = FileContext(table.file.parent, self.language)
-            beside = {"map_version": table.map_version, "robot": table.robot}
+            beside = table.model_dump(include={"level", "map_version", "robot"})
             read.append(read_zones(table.file, context, beside))
         return tuple(read)
 

@@ -71,9 +71,16 @@ Corners = Annotated[
 ]
 
 
-class Place(RobotKey):
+class OnMapKeys(RobotKey):
+    """The map that the table is of: by its version, or by the level whose map it is."""
+
+    level: Id | None = None
+    map_version: MapVersion | None = None
+
+
+class Place(OnMapKeys):
     """A named pose: `x` and `y` in metres, `yaw` in radians, in `frame`, by default the map's. With
-    `map_version` it is a place of that map only."""
+    `map_version` it is a place of that map only, with `level` one of that level."""
 
     id: Id
     label: Label
@@ -82,10 +89,9 @@ class Place(RobotKey):
     yaw: Yaw = 0.0
     icon: Icon | None = None
     frame: FrameName | None = None
-    map_version: MapVersion | None = None
 
 
-class Zone(RobotKey):
+class Zone(OnMapKeys):
     """An area of the map, by its corners in metres in the map's frame; `holes` are not of it. No goal
     may be in a `keep_out` zone; the others are only shown. `yaw` is where a `one_way` zone leads, in
     radians."""
@@ -98,7 +104,11 @@ class Zone(RobotKey):
         tuple[Corners, ...], Field(strict=False, max_length=MAX_HOLES), BeforeValidator(_check_holes)
     ] = ()
     yaw: Yaw | None = None
-    map_version: MapVersion | None = None
+
+    def counts_on(self, version: str, level: str) -> bool:
+        """Whether it is a zone of the map with this version, which is that of this level ("" for a map
+        without levels)."""
+        return self.map_version in (None, version) and self.level in (None, level)
 
     @cached_property
     def rings(self) -> tuple[Corners, ...]:
@@ -115,11 +125,10 @@ class Zone(RobotKey):
         return ""
 
 
-class ZoneFile(RobotKey):
+class ZoneFile(OnMapKeys):
     """A GeoJSON file with zones of the map, in metres in the map's frame."""
 
     file: File
-    map_version: MapVersion | None = None
 
 
 Places = Annotated[tuple[Place, ...], Field(strict=False, max_length=MAX_PLACES)]

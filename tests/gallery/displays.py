@@ -113,6 +113,8 @@ OTHERS: Final = {
     "robots": [ABSENT | {"pose": None, "note": say("map_robot_elsewhere")}],
     "robots_note": say("map_robot_note", name="Cell 1", note=say("map_robot_elsewhere")),
 }
+MAP_LEVELS: Final = [{"id": "ground", "label": texts.HALL.table, "topic": "/map"}]
+NO_LEVEL: Final = {"level": "", "level_note": say("map_level_waiting"), "levels": []}
 MAPS: Final = (
     Example("waiting", "map", MAP, {"state": "waiting", "note": say("map_waiting")} | NOWHERE),
     Example("unreadable", "map", MAP, {"state": "unreadable", "note": say("map_empty")} | NOWHERE),
@@ -130,6 +132,12 @@ MAPS: Final = (
         "map",
         MAP | {"robots": "all"},
         {"state": "live", "note": ""} | NOWHERE | OTHERS,
+    ),
+    Example(
+        "an unknown level",
+        "map",
+        {"label": texts.HALL.table, "level": MAP_LEVELS},
+        {"state": "waiting", "note": say("map_level_waiting")} | NOWHERE | NO_LEVEL,
     ),
 )
 PLACE: Final[Table] = {"label": texts.PLACES.table, "map": "hall", "touch": True}

@@ -260,6 +260,7 @@ SWITCH: Final = {
     "on_message": {"data": True},
     "off_message": {"data": False},
 }
+LEVELS: Final = [{"id": "l0", "label": "L0", "topic": "/l0", "value": 0}]
 STEP: Final = {
     "topic": "/set",
     "type": FLOAT,
@@ -348,6 +349,7 @@ ROWS: Final[Mapping[str, Row]] = {
     "current": Row(
         within("current", "sequence", steps=[{"text": "A"}, {"text": "B"}]), f"{IN_WIDGET}.current", INT
     ),
+    "robot_level": Row(within("robot_level", "map", level=LEVELS), f"{IN_WIDGET}.robot_level", INT),
     "value": Row(within("value", "step", **STEP), f"{IN_WIDGET}.value"),
     "reported": Row(within("reported", "switch", **SWITCH), f"{IN_WIDGET}.reported", BOOL),
 }  # fmt: skip
@@ -567,6 +569,7 @@ KNOWN: Final[Mapping[str, Known]] = {
     "line": lambda panel, robot, now: shown(panel, robot, now)["line0"] == "2 left",
     "setpoint": lambda panel, robot, now: shown(panel, robot, now)["setpoint"] is not None,
     "layer": lambda panel, robot, now: shown(panel, robot, now)["layer_0"]["state"] == "live",
+    "robot_level": lambda panel, robot, now: shown(panel, robot, now)["level"] == "l0",
     "reported": lambda panel, robot, now: shown(panel, robot, now)["at"] == "on",
     "readback": lambda panel, robot, now: reported_fields(panel.recipe_loads[0], robot, now)[
         "length"

@@ -9,6 +9,7 @@ from typing import Any, Final
 from tests.support.parts import ROOT
 
 FONTS: Final = ROOT / "static/fonts"
+NAV2: Final = ROOT / "docs/examples/mobile-robot/interfaces/nav2_msgs"
 NODE: Final = {
     "type": "Feature",
     "geometry": {"type": "Point", "coordinates": [0.0, 0.0]},
@@ -17,7 +18,8 @@ NODE: Final = {
 
 
 def put_beside(folder: Path) -> None:
-    """Puts the files that everything.toml names, but its interfaces, into the folder `msgs`."""
+    """Puts the files that everything.toml names, but its own interfaces, into the folder `msgs`."""
+    shutil.copytree(NAV2, folder / "msgs/nav2_msgs")
     (folder / "msgs/plan.svg").write_text("<svg/>")
     ring = [[6.0, 0.0], [7.0, 0.0], [7.0, 1.5], [6.0, 0.0]]
     pit = feature("Polygon", [ring], label="Pit", kind="keep_out")

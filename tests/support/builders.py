@@ -29,7 +29,7 @@ from app.ros.dialects import bridge_dialect
 from app.ros.dialects.bridge_dialect import BridgeDialect
 from app.ros.dialects.dialect import TopicRole
 from app.ros.dialects.peer_traits import BRIDGE_TRAITS
-from app.ros.messages import load_interfaces
+from app.ros.messages import Interfaces, load_interfaces
 from app.ros.messages.names import Qos
 from app.system.errors import PanelError
 
@@ -97,9 +97,9 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
     return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock, **more)
 
 
-def robot_there(panel: Panel, **callbacks: Any) -> RobotState:
+def robot_there(panel: Panel, *, interfaces: Interfaces = INTERFACES, **callbacks: Any) -> RobotState:
     """A robot that commands can reach: link and bridge are up. It has not published yet."""
-    robot = RobotState(panel, INTERFACES, DIALECT, TRAITS, KIOSK, **callbacks)
+    robot = RobotState(panel, interfaces, DIALECT, TRAITS, KIOSK, **callbacks)
     robot.link_up = True
     robot.settled_at = 0.0
     robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)

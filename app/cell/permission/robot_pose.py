@@ -1,16 +1,18 @@
-"""Where a robot is on a map, and whether that map is the robot's of now. Pure, from (widget, robot,
-time)."""
+"""Where a robot is on a map, on which of its levels, and whether that map is the robot's of now. Pure,
+from (widget, robot, time)."""
 
 import math
 from dataclasses import dataclass
 
 from app.cell.permission.verdict import topic_mismatch
-from app.cell.robot.maps import Geometry, MapState
+from app.cell.robot.maps import Geometry, Grid, MapState
 from app.cell.robot.state import RobotState
 from app.cell.robot.transforms import TF, TF_STATIC, TF_TYPE, LocatedFrame, Pose
 from app.panel.base import TopicQos
 from app.panel.shared_keys import stale_at
+from app.panel.values import same_value
 from app.panel.widgets.families import TopicSource
+from app.panel.widgets.map_levels import MapLevel, RobotLevel
 from app.panel.widgets.map_view import MapView, PoseTopic
 from app.system.clock import age_changes_at, format_age, format_time
 from app.system.texts import TextLike, say
@@ -87,3 +89,79 @@ def map_doubt(state: MapState, robot: RobotState) -> TextLike:
     if robot.is_foreign(state.source):
         return say("readout_foreign", time=format_time(state.wall))
     return state.doubt
+
+
+def map_on(level: MapLevel, robot: RobotState) -> Grid | TextLike:
+    """The map of a level, if it is the robot's of now; else why it is not."""
+    state = robot.maps[robot.key(level.topic)]
+    if mismatch := topic_mismatch("MS", level, robot):
+        return mismatch.reason or ""
+    if state.problem:
+        return state.problem
+    if state.grid is None:
+        return say("map_waiting")
+    if not state.grid.geometry.frame:
+        return say("map_no_frame")
+    return map_doubt(state, robot) or state.grid
+
+
+@dataclass(frozen=True, slots=True)
+class KnownLevel:
+    """The level on which the robot is: None if that is not known, and `note` says why. `until`
+    (monotonic seconds) is when time alone changes that."""
+
+    level: MapLevel | None
+    note: TextLike = ""
+    until: float = math.inf
+
+
+def robot_level(widget: MapView, robot: RobotState, now: float) -> KnownLevel:
+    """On which level of the map the robot is. A map without levels is its only one."""
+    if not widget.levels:
+        return KnownLevel(widget.maps[0])
+    if widget.robot_level is not None:
+        return _level_by_topic(widget, widget.robot_level, robot, now)
+    return _level_by_pose(widget, robot, now)
+
+
+def _level_by_topic(widget: MapView, source: RobotLevel, robot: RobotState, now: float) -> KnownLevel:
+    if mismatch := topic_mismatch("MS", source, robot):
+        return KnownLevel(None, mismatch.reason or "")
+    reading = robot.reading(source.topic)
+    if reading.fields is None:
+        return KnownLevel(None, say("map_level_waiting"))
+    if reading.status == "foreign":
+        return KnownLevel(None, say("readout_foreign", time=format_time(reading.wall)))
+    if reading.status in ("cut", "ended"):
+        return KnownLevel(None, say("readout_before_disconnect", time=format_time(reading.wall)))
+    if now >= (until := stale_at(reading.at, source.max_age_s)):
+        note = say("map_level_old", age=format_age(now - reading.at))
+        return KnownLevel(None, note, age_changes_at(reading.at, now))
+    value = reading.value(source.field)
+    for level in widget.levels:
+        if same_value(level.compared, value):
+            return KnownLevel(level, until=until)
+    return KnownLevel(
+        None,
+        say("map_level_other", value=f"{value:.60}" if isinstance(value, str) else str(value)),
+        until,
+    )
+
+
+def _level_by_pose(widget: MapView, robot: RobotState, now: float) -> KnownLevel:
+    """The level to whose map the robot's pose leads, if it leads to no other."""
+    levels: list[MapLevel] = []
+    until = math.inf
+    for level in widget.levels:
+        if isinstance(grid := map_on(level, robot), Grid):
+            shown = locate(widget, robot, grid.geometry, now)
+            until = min(until, shown.until)
+            if shown.pose is not None and not shown.note:
+                levels.append(level)
+    match levels:
+        case [level]:
+            return KnownLevel(level, until=until)
+        case [first, second, *_]:
+            note = say("map_level_several", first=first.label, second=second.label)
+            return KnownLevel(None, note, until)
+    return KnownLevel(None, say("map_level_nowhere"), until)

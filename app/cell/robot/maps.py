@@ -7,7 +7,7 @@ tile is made when a browser asks for it. The tiles of 4000 x 4000 cells have 0.2
 import hashlib
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -56,6 +56,15 @@ COST_PALETTES: Final = {
     "dark": (0, 0, 0, *3 * (240, 190, 110)),
     "contrast": (0, 0, 0, *3 * (130, 60, 0)),
 }
+# A mask is drawn in the colour of texts, hatched or dotted, so it is seen without colour.
+FAINT, LINE, MARKED = 1, 3, 3
+HATCH_CELLS: Final = 8
+MASK_ALPHA: Final = bytes((0, 40, 0, 200))
+MASK_PALETTES: Final = {
+    "light": (0, 0, 0, *3 * (18, 23, 27)),
+    "dark": (0, 0, 0, *3 * (222, 228, 232)),
+    "contrast": (0, 0, 0, *3 * (0, 0, 0)),
+}
 PALETTES: Final = {
     "light": (0, 0, 0, 247, 249, 250, 176, 184, 192, 18, 23, 27),
     "dark": (0, 0, 0, 56, 64, 72, 112, 122, 132, 222, 228, 232),
@@ -91,7 +100,7 @@ class Grid:
     cells: memoryview
     digest: str
     head: bytes = b""
-    floors: dict[tuple[float, float, float], Any] = field(default_factory=dict)  # see `floor_at`
+    floors: dict[Hashable, Any] = field(default_factory=dict)  # by circle, see `places.py`
 
     @property
     def version(self) -> str:
@@ -230,15 +239,44 @@ def _origin(pose: Any) -> Pose | None:
 def tile(grid: Grid, column: int, row: int, theme: str, *, costs: bool = False) -> bytes:
     """A tile as a PNG file with the colours of a theme: `TILE` cells a side, fewer at the map's end.
     Column 0 begins at the map's origin, and row 0 at its upper edge. `costs`: as a costmap."""
+    lines = _lines(grid, column, row)
+    cells, width = b"".join(lines), len(lines[0])
+    if costs:
+        return _png(cells.translate(COSTS), width, len(lines), COST_PALETTES[theme], COST_ALPHA)
+    return _png(cells.translate(COLOURS), width, len(lines), PALETTES[theme])
+
+
+def _lines(grid: Grid, column: int, row: int) -> list[memoryview]:
+    """The cells of a tile, the upper row first."""
     width, height = grid.geometry.width, grid.geometry.height
     left, right = column * TILE, min((column + 1) * TILE, width)
     top, bottom = height - row * TILE, max(height - (row + 1) * TILE, 0)
-    lines = (grid.cells[y * width + left : y * width + right] for y in range(top - 1, bottom - 1, -1))
-    cells = b"".join(lines)
-    if costs:
-        pixels, palette, alpha = cells.translate(COSTS), COST_PALETTES[theme], COST_ALPHA
-        return _png(pixels, right - left, top - bottom, palette, alpha)
-    return _png(cells.translate(COLOURS), right - left, top - bottom, PALETTES[theme])
+    return [grid.cells[y * width + left : y * width + right] for y in range(top - 1, bottom - 1, -1)]
+
+
+def mask_tile(
+    grid: Grid, column: int, row: int, theme: str, marked: bytes, *, is_hatched: bool
+) -> bytes:
+    """A tile of a mask: cells whose byte `marked` has as 1 are hatched or dotted, the others
+    transparent."""
+    lines = _lines(grid, column, row)
+    width, period = len(lines[0]), HATCH_CELLS
+    mark = bytes(MARKED * each for each in marked)
+    pixels = bytearray()
+    for y, line in enumerate(lines):
+        pattern = bytes(LINE if _is_line(x, y, is_hatched=is_hatched) else FAINT for x in range(period))
+        drawn = int.from_bytes(bytes(line).translate(mark)) & int.from_bytes(
+            (pattern * (width // period + 1))[:width]
+        )
+        pixels += drawn.to_bytes(width)
+    return _png(bytes(pixels), width, len(lines), MASK_PALETTES[theme], MASK_ALPHA)
+
+
+def _is_line(column: int, row: int, *, is_hatched: bool) -> bool:
+    """Whether a cell is of the lines of a hatch, or of the dots of another mask."""
+    if is_hatched:
+        return (column + row) % HATCH_CELLS < HATCH_CELLS // 4
+    return column % HATCH_CELLS < 2 and row % HATCH_CELLS < 2
 
 
 def reduced(grid: Grid) -> bytes:

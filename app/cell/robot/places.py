@@ -28,6 +28,22 @@ def floor_at(grid: Grid, x: float, y: float, radius: float) -> Floor:
     return known
 
 
+def is_marked_near(grid: Grid, x: float, y: float, radius: float, marked: bytes) -> bool:
+    """Whether a cell within `radius` of a point has a byte that `marked` has as 1. What is beyond the
+    grid's edge is not marked; a circle that is too large to be looked at is. Kept with the grid."""
+    asked = (x, y, radius, marked)
+    known = grid.floors.get(asked)
+    if known is None:
+        if len(grid.floors) >= MAX_KEPT:
+            grid.floors.clear()
+        lines = _circle(grid, x, y, radius)
+        known = radius / grid.geometry.resolution * 2 > MAX_ROWS or any(
+            1 in line.translate(marked) for line in lines
+        )
+        grid.floors[asked] = known
+    return bool(known)
+
+
 def _floor(grid: Grid, x: float, y: float, radius: float) -> Floor:
     width, height = grid.geometry.width, grid.geometry.height
     column, row = _cell(grid, x, y)
@@ -37,16 +53,26 @@ def _floor(grid: Grid, x: float, y: float, radius: float) -> Floor:
     if reach * 2 > MAX_ROWS:
         return "unknown"
     is_known = reach <= min(column, width - column, row, height - row)
+    for line in _circle(grid, x, y, radius):
+        colours = line.translate(COLOURS)
+        if OCCUPIED_COLOUR in colours:
+            return "occupied"
+        is_known = is_known and not colours.strip(bytes((FREE_COLOUR,)))
+    return "free" if is_known else "unknown"
+
+
+def _circle(grid: Grid, x: float, y: float, radius: float) -> Iterator[bytes]:
+    """The cells that a circle touches, line by line."""
+    width, height = grid.geometry.width, grid.geometry.height
+    column, row = _cell(grid, x, y)
+    reach = radius / grid.geometry.resolution
     for line in range(max(math.floor(row - reach), 0), min(math.floor(row + reach) + 1, height)):
         # The nearest edge of this line of cells decides how wide the circle is there.
         away = max(line - row, row - line - 1, 0.0)
         half = math.sqrt(max(reach * reach - away * away, 0.0))
         left, right = max(math.floor(column - half), 0), min(math.floor(column + half) + 1, width)
-        colours = bytes(grid.cells[line * width + left : line * width + right]).translate(COLOURS)
-        if OCCUPIED_COLOUR in colours:
-            return "occupied"
-        is_known = is_known and not colours.strip(bytes((FREE_COLOUR,)))
-    return "free" if is_known else "unknown"
+        if left < right:
+            yield bytes(grid.cells[line * width + left : line * width + right])
 
 
 def _cell(grid: Grid, x: float, y: float) -> tuple[float, float]:
@@ -65,13 +91,13 @@ class KeepOut:
         self._zones = [(_box(zone.rings), zone) for zone in zones if zone.kind == "keep_out"]
         self._touched = BoundedDict[tuple[float, float, float], tuple[Zone, ...]](MAX_KEPT)
 
-    def at(self, version: str, x: float, y: float, radius: float) -> Zone | None:
-        """The first zone of the map with this version that a circle touches."""
+    def at(self, version: str, level: str, x: float, y: float, radius: float) -> Zone | None:
+        """The first zone of the map with this version, of this level, that a circle touches."""
         circle = x, y, radius
         touched = self._touched.get(circle)
         if touched is None:
             touched = self._touched[circle] = tuple(self._touching(x, y, radius))
-        return next((zone for zone in touched if zone.map_version in (None, version)), None)
+        return next((zone for zone in touched if zone.counts_on(version, level)), None)
 
     def _touching(self, x: float, y: float, radius: float) -> Iterator[Zone]:
         for (left, bottom, right, top), zone in self._zones:

@@ -92,7 +92,7 @@ def attributes_of(
     if isinstance(widget, Command):
         attributes, until = find_row(COMMANDS, widget)(widget, robot, verdict, now)
         if widget.id in robot.place_inputs:
-            attributes = {**attributes, "map_versions": map_versions(widget.id, robot)}
+            attributes = {**attributes, "map_versions": map_versions(widget.id, robot, now)}
     else:
         attributes, until = find_row(ATTRIBUTES, widget)(widget, robot, now)
     if isinstance(widget, Display):

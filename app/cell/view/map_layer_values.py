@@ -5,26 +5,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.cell.permission.verdict import topic_mismatch
+from app.cell.permission.map_masks import Mask, layer_doubt, layer_label, mask_of
 from app.cell.robot.map_layers import LayerState, Shape, placed
 from app.cell.robot.maps import Arrival, Geometry, Grid
 from app.cell.robot.state import RobotState
 from app.cell.robot.transforms import IDENTITY, LocatedFrame, Pose, Quaternion, Transform
 from app.panel.shared_keys import stale_at
-from app.panel.widgets.map_layers import GRID_TYPE, LayerName, MapLayer
+from app.panel.widgets.map_layers import GRID_TYPE, MapLayer
 from app.panel.widgets.map_view import MapView
-from app.system.clock import age_changes_at, format_age, format_time
-from app.system.texts import TextLike, number, say
+from app.system.clock import format_age
+from app.system.texts import TextLike, joined, number, say
 
 COSTMAP: Final = "cost-"  # before the version of a costmap
 AHEAD_S: Final = 1.0  # by which a message may be newer than the transforms
-LABELS: Final[Mapping[LayerName, TextLike]] = {
-    "path": say("map_layer_path"),
-    "scan": say("map_layer_scan"),
-    "footprint": say("map_layer_footprint"),
-    "covariance": say("map_layer_covariance"),
-    "costmap": say("map_layer_costmap"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +26,6 @@ class ShownLayer:
 
     attributes: Mapping[str, Any]
     until: float = math.inf
-
-
-def layer_label(layer: MapLayer) -> TextLike:
-    """Its label, or what its kind is called."""
-    return layer.label or LABELS[layer.shows]
 
 
 def map_layer(
@@ -49,7 +37,7 @@ def map_layer(
     `grid`, as a map's."""
     key = robot.key(layer.topic)
     state: Arrival = robot.maps[key] if layer.type == GRID_TYPE else robot.map_layers[key]
-    problem, code, until = _doubt(layer, state, robot, now)
+    problem, code, until = layer_doubt(layer, state, robot, now)
     if not problem:
         shown = _drawn(widget, layer, robot, geometry, now)
         if isinstance(shown, ShownLayer):
@@ -63,31 +51,13 @@ def map_layer(
     return ShownLayer(attributes, until)
 
 
-def _doubt(
-    layer: MapLayer, state: Arrival, robot: RobotState, now: float
-) -> tuple[TextLike, str, float]:
-    """Why a layer may not be drawn as what is there now, "" if it may; its state, and until when."""
-    if mismatch := topic_mismatch("MS", layer, robot):
-        return mismatch.reason or "", "unreadable", math.inf
-    if state.problem:
-        return state.problem, "unreadable", math.inf
-    if state.at == -math.inf:
-        return say("map_layer_waiting"), "waiting", math.inf
-    if state.is_cut:
-        return say("readout_before_disconnect", time=format_time(state.wall)), "old", math.inf
-    if robot.is_foreign(state.source):
-        return say("readout_foreign", time=format_time(state.wall)), "old", math.inf
-    at = max(state.at, getattr(state, "updated_at", state.at))
-    if now >= (until := stale_at(at, layer.most_age_s)):
-        return say("map_layer_old", age=format_age(now - at)), "old", age_changes_at(at, now)
-    return getattr(state, "doubt", ""), "old", until
-
-
 def _drawn(
     widget: MapView, layer: MapLayer, robot: RobotState, geometry: Geometry, now: float
 ) -> ShownLayer | TextLike:
     """What is drawn, or why it has no place on the map."""
     key = robot.key(layer.topic)
+    if layer.row.is_mask:
+        return _drawn_mask(layer, robot, geometry, now)
     if layer.type == GRID_TYPE:
         grid = robot.maps[key].grid
         if grid is None:
@@ -114,6 +84,25 @@ def _drawn(
         return ShownLayer(_live(ellipse=ellipse), _old_at(widget, located))
     points = _placed(state, shape, geometry.frame, located.transform)
     return ShownLayer(_live(points=points), _old_at(widget, located))
+
+
+def _drawn_mask(
+    layer: MapLayer, robot: RobotState, geometry: Geometry, now: float
+) -> ShownLayer | TextLike:
+    """A mask; that of speeds with its limits as the note."""
+    state = mask_of(layer, robot, geometry, now)
+    if (mask := state.mask) is None:
+        return state.note
+    placed_at = mask.grid.geometry
+    grid = grid_values(placed_at, mask_version(layer, mask), placed_at.origin)
+    note = say("map_mask_limits", limits=joined(mask.limits(), "between_names"))
+    has_limits = layer.shows == "speed" and bool(mask.limits())
+    return ShownLayer(_live(grid=grid) | {"note": note if has_limits else ""}, state.until)
+
+
+def mask_version(layer: MapLayer, mask: Mask) -> str:
+    """What the paths of its tiles name it."""
+    return f"{layer.shows}-{mask.version}"
 
 
 def _placed(state: LayerState, shape: Shape, frame: str, transform: Transform) -> list[int]:

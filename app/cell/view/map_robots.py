@@ -46,7 +46,8 @@ def other_robots(
     `robots_note`, which names those that are not drawn and says why. A robot is drawn only on the map
     that it has itself: the version of a map is that of its cells, its place and its frame."""
     grid = shown.get("grid")
-    rows = [_row(grid["version"] if grid else "", *other) for other in others]
+    levels = {row["grid"]["version"]: row for row in shown.get("levels", ()) if row["grid"]}
+    rows = [_row(grid["version"] if grid else "", levels, *other) for other in others]
     if not grid:  # the map says itself what is wrong
         return {"robots": rows, "robots_note": ""}
     absent = [row for row in rows if row["state"] == "absent"]
@@ -54,13 +55,24 @@ def other_robots(
     return {"robots": rows, "robots_note": joined(notes)}
 
 
-def _row(version: str, robot: str, name: TextLike, position: RobotOnMap) -> dict[str, Any]:
-    """`state` is live, old or absent; `label` stands at the robot on the map."""
-    row = {"robot": robot, "name": name, "label": name, "state": "absent", "pose": None}
-    if version and position.version and position.version != version:
+def _row(
+    version: str,
+    levels: Mapping[str, Mapping[str, Any]],
+    robot: str,
+    name: TextLike,
+    position: RobotOnMap,
+) -> dict[str, Any]:
+    """`state` is live, old or absent; `label` stands at the robot on the map. `level` is the id of the
+    level that it is on, "" without levels. `levels` are by the versions of their maps."""
+    row = {"robot": robot, "name": name, "label": name, "state": "absent", "pose": None, "level": ""}
+    on = levels.get(position.version)
+    if on is None and version and position.version and position.version != version:
         return row | {"note": say("map_robot_elsewhere")}
-    if not version or not position.version or position.pose is None:
+    if not (version or on) or not position.version or position.pose is None:
         return row | {"note": position.note}
     label = say("map_robot_age", name=name, age=position.age) if position.age else name
     state = "live" if position.state == "live" else "old"
-    return row | {"label": label, "state": state, "note": position.note, "pose": position.pose}
+    note = position.note
+    if on is not None:
+        row, note = row | {"level": on["id"]}, note or say("map_robot_level", level=on["label"])
+    return row | {"label": label, "state": state, "note": note, "pose": position.pose}

@@ -7,6 +7,7 @@ from app.cell.permission.goal_places import (
     Choice,
     choice_of,
     input_verdict,
+    map_here,
     metres,
     name_of,
     place_choice,
@@ -37,25 +38,26 @@ class CardRow(NamedTuple):
 
 class Card(NamedTuple):
     """What is chosen, as an operator reads it before it is sent: `pose` is what would be sent.
-    `refusal` is why it would be refused now, "" if it would not."""
+    `level` is the id of its level, "" on a map without levels and where that is not known. `refusal` is
+    why it would be refused now, "" if it would not."""
 
     name: TextLike
     rows: tuple[CardRow, ...]
     pose: Pose
+    level: str
     refusal: TextLike
 
 
 def place_input(widget: PlaceInput, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state` (live, missing), `note`, why nothing may be sent now, "" if something may,
-    and `places`, each with `id`, `label`, `icon`, its pose, the distance to the robot, "" where that is
-    not known, and the `reason` why it is locked; `commands` are the ids of those that send it, and
-    `radius` (metres) is how much floor must be free; and when they change."""
+    and `places`, each with `id`, `label`, `icon`, its pose, its `level`, the distance to the robot, ""
+    where that is not known, and the `reason` why it is locked; `commands` are those that send it,
+    by their ids, and `radius` (metres) is how much floor must be free; and when they change."""
     verdict = input_verdict(widget, robot, now)
-    shown = robot_pose(widget, robot, now)
+    shown, on = robot_pose(widget, robot, now), map_here(widget, robot, now)
     here = None if shown.note else shown.pose
-    places = [
-        _shown_place(place_choice(widget, place, robot), here) for place in places_of(widget, robot)
-    ]
+    choices = [place_choice(widget, place, robot, on) for place in places_of(widget, robot)]
+    places = [_shown_place(choice, here) for choice in choices]
     note = "" if verdict.permitted else verdict.reason or ""
     commands = [name for name, inputs in robot.place_inputs.items() if widget in inputs]
     shown_now = {"state": "missing" if note else "live", "note": note, "places": places}
@@ -70,14 +72,15 @@ def _shown_place(choice: Choice, here: Pose | None) -> dict[str, Any]:
         "label": place.label,
         "icon": place.icon or "",
         "pose": [round(part, DECIMALS) for part in pose],
-        "distance": "" if here is None else distance(here, pose),
+        "level": "" if choice.level is None else choice.level.id,
+        "distance": "" if here is None or choice.is_elsewhere else distance(here, pose),
         "reason": choice.refusal,
     }
 
 
 def card_of(widget: PlaceInput, value: Any, robot: RobotState, now: float) -> Card:
     """The card of a value; InputError for one that chooses nothing."""
-    choice = choice_of(widget, value, robot)
+    choice = choice_of(widget, value, robot, now)
     verdict = input_verdict(widget, robot, now)
     shown = robot_pose(widget, robot, now)
     refusal = choice.refusal if verdict.permitted else verdict.reason or ""
@@ -86,15 +89,18 @@ def card_of(widget: PlaceInput, value: Any, robot: RobotState, now: float) -> Ca
     rows = [CardRow(say("place_row_place"), where)]
     if choice.place is not None:
         rows = [CardRow(say("place_row_place"), choice.place.label), CardRow("", where)]
+    level = choice.level
+    if level is not None and level.label:
+        rows.append(CardRow("", level.label))
     rows.append(CardRow(say("place_row_turned"), turned(pose.yaw)))
-    if shown.pose is not None and not shown.note:
+    if shown.pose is not None and not shown.note and not choice.is_elsewhere:
         rows.append(
             CardRow(say("place_row_way"), say("place_straight", distance=distance(shown.pose, pose)))
         )
     if not refusal:
         free = say("place_free", radius=number(f"{radius_of(widget, robot):g}", "m"))
         rows.append(CardRow(say("place_row_floor"), free))
-    return Card(name_of(choice), tuple(rows), pose, refusal)
+    return Card(name_of(choice), tuple(rows), pose, level.id if level else "", refusal)
 
 
 def distance(first: Pose, second: Pose) -> TextLike:

@@ -352,7 +352,9 @@ def _shown_keys(widget: DisplayWidget, panel: Panel, robot: RobotState) -> froze
     """The keys of the topics that a display shows, also of the conditions that it names."""
     topics = {source.topic for source in widget.sources()}
     if isinstance(widget, PlaceInput):
-        sources = panel.map_views[widget.map].sources()
+        view = panel.map_views[widget.map]
+        sources = view.sources()
         topics |= {source.topic for source in sources if not source.place.startswith("layer")}
+        topics |= {layer.topic for layer in view.keep_out} | view.deciding_topics
     topics |= {c.topic for c in panel.named_conditions if c.id in widget.named_conditions}
     return frozenset(key for topic in topics for key in robot.possible_keys(topic))

@@ -1,13 +1,14 @@
 """Checks of places, zones, and of inputs whose value is a place."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from app.panel.file.wording import no_such
 from app.panel.model import Panel
-from app.panel.places import MAX_ZONES
+from app.panel.places import MAX_ZONES, OnMapKeys, Place
 from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
 from app.panel.widgets.families import BaseWidget, Command, PressCommand
+from app.panel.widgets.map_layers import level_key_faults
 from app.panel.widgets.place import PlaceInput
 from app.system.errors import Fault
 from app.system.texts.text import alike
@@ -23,6 +24,7 @@ def place_faults(panel: Panel) -> Iterator[Fault]:
     for z, zone in enumerate(panel.zones):
         if zone.yaw_fault:
             yield Fault(f"zone[{z}].yaw", zone.yaw_fault)
+    yield from _level_faults(panel)
     yield from _zone_file_faults(panel)
     for p, page in enumerate(panel.pages):
         for place_of, widget in page.placed():
@@ -33,6 +35,42 @@ def place_faults(panel: Panel) -> Iterator[Fault]:
             if name in chosen:
                 message = f'"{name}" is a place, of the moment: a recipe has other inputs'
                 yield Fault(f"recipe[{r}].fields[{f}]", message)
+
+
+def _level_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of levels that no map has, and of places that would be on any level."""
+    known = {str(level.id): None for view in panel.map_views.values() for level in view.levels}
+    tables: dict[str, Sequence[OnMapKeys]] = {
+        "place": panel.places,
+        "zone": panel.zones,
+        "zone_file": panel.zone_files,
+    }
+    for name, rows in tables.items():
+        for n, row in enumerate(rows):
+            required = isinstance(row, Place) and row.map_version is None and _needs_level(row, panel)
+            yield from level_key_faults(f"{name}[{n}]", row.level, tuple(known), required=required)
+
+
+def _needs_level(place: Place, panel: Panel) -> bool:
+    """Whether each map that is to offer the place has levels."""
+    inputs = (each for each in panel.place_inputs if each.places is None)
+    views = [view for each in inputs if (view := panel.map_views.get(each.map)) is not None]
+    return bool(views) and all(view.levels for view in views)
+
+
+def _offered_level_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Fault]:
+    """Faults of places that the input offers, and whose level its map does not have."""
+    if (view := panel.map_views.get(widget.map)) is None:
+        return
+    known = {str(each.id): each for each in panel.places}
+    for n, name in enumerate(widget.places or ()):
+        if name not in known or view.offers(known[name]):
+            continue
+        level = known[name].level
+        message = f'"{name}" is on the level {level}, and the map {widget.map} has none of it'
+        if level is None:
+            message = f'"{name}" names no level, and the map {widget.map} has levels'
+        yield Fault(f"{place}.places[{n}]", message, cause=f"level {name}")
 
 
 def _zone_file_faults(panel: Panel) -> Iterator[Fault]:
@@ -81,6 +119,7 @@ def _input_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Faul
     for n, name in enumerate(widget.places or ()):
         if name not in known:
             yield Fault(f"{place}.places[{n}]", no_such("place", name, known), cause=f"place {name}")
+    yield from _offered_level_faults(place, widget, panel)
     if widget.needs and not widget.save:
         yield Fault(f"{place}.needs", "is for saving places: add save = true", cause="save")
     if not known and not widget.touch and not widget.save:

@@ -40,7 +40,8 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
 
 def _map_line(widget: MapView) -> str:
     """What its origin means, which only the robot's message says."""
-    drawn = f"shows {widget.topic} with the rotation of its origin"
+    topics = " and ".join(level.topic for level in widget.maps)
+    drawn = f"shows {topics} with the rotation of its origin"
     return f"{drawn}; Nav2's costmap and AMCL ignore that rotation"
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
@@ -10,6 +10,7 @@ from app.panel.base import (
     Description,
     File,
     FiniteNumber,
+    Id,
     Label,
     Rows,
     Seconds,
@@ -18,12 +19,27 @@ from app.panel.base import (
     TopicQos,
 )
 from app.panel.geojson import RouteGraph, read_route_graph
-from app.panel.places import FrameName, Metres, Yaw
+from app.panel.places import FrameName, Metres, Place, Yaw
 from app.panel.shared_keys import AgeKey, RobotsKey, TopicKeys
 from app.panel.widgets.displays import PictureName, picture_faults
 from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
-from app.panel.widgets.map_layers import GRID_TYPE, MAX_LAYERS, Corners, MapLayer, updates_of
+from app.panel.widgets.map_layers import (
+    GRID_TYPE,
+    MAX_LAYERS,
+    Corners,
+    MapLayer,
+    level_key_faults,
+    updates_of,
+)
+from app.panel.widgets.map_levels import (
+    MapLevel,
+    MapLevels,
+    RobotLevel,
+    level_faults,
+    with_values,
+)
 from app.ros.dialects.dialect import Role
+from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
 
@@ -55,10 +71,12 @@ class PoseTopic(TopicKeys):
 
 
 class MapRoutes(Description):
-    """The route graph of a GeoJSON file, as Nav2's route server has it."""
+    """The route graph of a GeoJSON file, as Nav2's route server has it. `level` is the level of the map
+    that it is on."""
 
     file: File
     label: Label | None = None
+    level: Id | None = None
 
     @cached_property
     def graph(self) -> RouteGraph:
@@ -89,17 +107,22 @@ class MapPlan(Description):
     origin: Origin = (0.0, 0.0, 0.0)
     under_map: bool = False
     label: Label | None = None
+    level: Id | None = None
 
 
 class MapView(RobotsKey, AgeKey, TopicWidget, DisplayWidget):
     """Shows a map (`nav_msgs/msg/OccupancyGrid`) with the robot: by its transforms from the map's frame
     to `base_frame`, or by a topic with its pose. A pose older than `max_age_s` is drawn as old, where
     the robot was last seen. `layers` are drawn over the map; `footprint` has the robot's corners in
-    `base_frame`, in metres. `robots`: on a page of several robots the others may be shown too."""
+    `base_frame`, in metres. `robots`: on a page of several robots the others may be shown too. With
+    `levels` each of them has a map, and the robot is on the one that `robot_level` says or, without it,
+    on the only one to whose map its pose leads."""
 
     kind: Literal["map"]
     topic: TopicName = "/map"
     type: Literal["nav_msgs/msg/OccupancyGrid"] = "nav_msgs/msg/OccupancyGrid"
+    levels: MapLevels = Field(default=(), alias="level")
+    robot_level: RobotLevel | None = None
     pose: PoseTopic | None = None
     base_frame: FrameName = "base_link"
     radius: Annotated[float, Field(gt=0, le=100)] = 0.3
@@ -115,9 +138,35 @@ class MapView(RobotsKey, AgeKey, TopicWidget, DisplayWidget):
 
     @property
     def grids(self) -> tuple[str, ...]:
-        """The topics of the map and of its costmaps."""
+        """The topics of its maps and costmaps."""
+        maps = (level.topic for level in self.maps)
         costmaps = (layer.topic for layer in self.layers if layer.type == GRID_TYPE)
-        return tuple(dict.fromkeys((self.topic, *costmaps)))
+        return tuple(dict.fromkeys((*maps, *costmaps)))
+
+    @cached_property
+    def maps(self) -> tuple[MapLevel, ...]:
+        """Its levels; a map without levels is the only one, without a name."""
+        own: dict[str, Any] = {"id": "", "label": "", "topic": self.topic, "qos": self.qos}
+        return self.levels or (MapLevel.model_construct(**own),)
+
+    def offers(self, place: Place) -> bool:
+        """Whether a place may be of it: of one of its levels or, without levels, of none."""
+        if not self.levels:
+            return place.level is None
+        known = {level.id for level in self.levels}
+        return place.map_version is not None if place.level is None else place.level in known
+
+    @property
+    def keep_out(self) -> tuple[MapLayer, ...]:
+        """The masks in whose cells no goal may be."""
+        return tuple(layer for layer in self.layers if layer.shows == "keep_out")
+
+    @property
+    def deciding_topics(self) -> frozenset[str]:
+        """The topics, beside maps and transforms, by which a goal on it is judged."""
+        sources = (self.pose, self.robot_level)
+        infos = (layer.info for layer in self.keep_out if layer.info)
+        return frozenset((*(source.topic for source in sources if source is not None), *infos))
 
     @property
     def has_list(self) -> bool:
@@ -130,8 +179,10 @@ class MapView(RobotsKey, AgeKey, TopicWidget, DisplayWidget):
         return self.pose is None or bool(self.layers)
 
     def sources(self) -> Iterator[TopicSource]:
-        yield TopicSource(self.topic, self.type, self.qos, ())
-        yield updates_of(self.topic)
+        for number, level in enumerate(self.maps):
+            yield from level.sources(f"level[{number}]" if self.levels else "")
+        if self.robot_level is not None:
+            yield self.robot_level.source("robot_level")
         for number, layer in enumerate(self.layers):
             yield from layer.sources(f"layer[{number}]")
         if self.pose is not None:
@@ -147,9 +198,27 @@ class MapView(RobotsKey, AgeKey, TopicWidget, DisplayWidget):
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
+        yield from level_faults(place, self.levels, self.robot_level, checking.interfaces)
+        yield from self._level_faults(place)
+        levels = [str(level.id) for level in self.levels]
         for number, layer in enumerate(self.layers):
-            yield from layer.faults(f"{place}.layer[{number}]")
+            yield from layer.faults(f"{place}.layer[{number}]", levels, checking.interfaces)
         if self.routes is not None:
             yield from (Fault(f"{place}.routes.file", words) for words in self.routes.graph.faults)
         if self.plan is not None:
             yield from picture_faults(f"{place}.plan.src", self.plan.src, checking.pictures)
+
+    def _level_faults(self, place: str) -> Iterator[Fault]:
+        """Faults of what is of a map without levels, or of one with."""
+        if self.levels and "topic" in self.model_fields_set:
+            yield Fault(f"{place}.topic", "is of a map without levels: here each level has its topic")
+        known = [str(level.id) for level in self.levels]
+        for key, table in (("routes", self.routes), ("plan", self.plan)):
+            if table is not None:
+                yield from level_key_faults(f"{place}.{key}", table.level, known, required=bool(known))
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        if self.robot_level is None:
+            return self
+        levels = with_values(self.levels, self.robot_level, interfaces)
+        return self.model_copy(update={"levels": levels})

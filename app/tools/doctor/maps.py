@@ -1,6 +1,6 @@
 """The maps of a panel on its robot: latched, readable, and with a way to the robot. Pure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from app.cell.robot.maps import Geometry, NoMap, read_grid
@@ -31,13 +31,17 @@ class MapChecks:
 
     def check(self) -> None:
         uses_transforms = any(view.pose is None for view in self._views)
-        maps = dict.fromkeys(view.topic for view in self._views)
+        maps = dict.fromkeys(level.topic for view in self._views for level in view.maps)
         for topic in (*maps, *((TF_STATIC,) if uses_transforms else ())):
             self._check_latched(topic)
         tree = self._transforms() if uses_transforms else TransformTree()
+        read = {topic: self._geometry(topic) for topic in maps}
         for view in self._views:
-            if (geometry := self._geometry(view.topic)) is not None:
-                self._check_way(view, geometry, tree)
+            known = [grid for level in view.maps if (grid := read[level.topic]) is not None]
+            if len(view.maps) == len(known) == 1:
+                self._check_way(view, known[0], tree)
+            elif known:
+                self._check_levels(view, known, tree)
 
     def _find(self, code: str, about: str, **details: TextLike) -> None:
         self._report.find(code, about, robot=self._robot, **details)
@@ -87,6 +91,15 @@ class MapChecks:
             self._report.fact(f"transforms lead from {geometry.frame} to {view.base_frame}")
         else:
             self._find("map_no_transform", view.topic, detail=located)
+
+    def _check_levels(self, view: MapView, maps: Sequence[Geometry], tree: TransformTree) -> None:
+        """Whether it is known where the robot is on the map of one of the levels."""
+        if view.pose is not None:
+            return  # its frame is that of the level on which the robot is
+        located = [tree.locate(view.base_frame, geometry.frame) for geometry in maps]
+        missing = [each for each in located if not isinstance(each, LocatedFrame)]
+        if len(missing) == len(maps):
+            self._find("map_no_transform", view.maps[0].topic, detail=missing[0])
 
     def _check_pose(self, pose: PoseTopic, geometry: Geometry) -> None:
         """Whether the pose is in the frame of the map; nothing is said of one that did not come."""

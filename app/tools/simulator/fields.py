@@ -55,6 +55,13 @@ class PanelFields:
         self.paths = {
             topic: list(dict.fromkeys(paths)) for topic, paths in panel.subscribed_fields().items()
         }
+        self.levels_below = {
+            level.topic: [str(below.id) for below in view.levels[:number]]
+            for view in panel.map_views.values()
+            for number, level in enumerate(view.levels)
+        }
+        layers = (layer for view in panel.map_views.values() for layer in view.layers)
+        self.levels_below |= {layer.topic: [layer.shows] for layer in layers if layer.row.is_mask}
         self.confirmed = {
             (confirmation.topic, confirmation.field) for confirmation in panel.confirmations()
         }

@@ -28,6 +28,7 @@ from app.panel.widgets.gauge import Figure, Gauge, SetpointField, TargetField
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row, require_rows
+from app.panel.widgets.map_layers import INFO_FIELDS, INFO_TYPE
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import Parameter, listed_parameter
 from app.panel.widgets.place import PlaceInput
@@ -165,6 +166,18 @@ def _camera(camera: Camera, _: Interfaces) -> Iterator[Need]:
     )
 
 
+def _map(view: MapView, _: Interfaces) -> Iterator[Need]:
+    """From level to level."""
+    if view.robot_level is not None:
+        values = tuple(level.compared for level in view.levels)
+        yield replace(_of_field(view.robot_level), values=values)
+    for layer in view.layers:
+        if layer.info is not None:
+            said = (int(layer.shows == "speed"), layer.topic, 0.0, 1.0)
+            for field, value in zip(INFO_FIELDS, said, strict=True):
+                yield DisplayedField(topic=layer.info, type=INFO_TYPE, field=field, values=(value,))
+
+
 def _trend(trend: Trend, _: Interfaces) -> Iterator[Need]:
     for readout in trend.readouts:
         yield from _fields_of(readout)
@@ -271,7 +284,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Joints: _joints,
     Table: None,
     LogView: None,
-    MapView: None,
+    MapView: _map,
     PlaceInput: None,
     AlarmView: None,
     Camera: _camera,

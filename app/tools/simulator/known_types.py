@@ -250,14 +250,15 @@ def _compressed(moment: Moment, _: Collection[str]) -> Fields:
     }
 
 
-def _map(moment: Moment, _: Collection[str]) -> Fields:
-    """A room with walls and a table."""
+def _map(moment: Moment, below: Collection[str]) -> Fields:
+    """A room with walls and a table, which is elsewhere if there are levels `below` it."""
     width, height = MAP
+    left = 18 - 5 * (len(below) % 4)
     cells = []
     for y in range(height):
         for x in range(width):
             wall = x in (0, width - 1) or y in (0, height - 1)
-            table = 18 <= x < 26 and 12 <= y < 18
+            table = left <= x < left + 8 and 12 <= y < 18
             cells.append(100 if wall or table else 0)
     about = {"resolution": 0.125, "width": width, "height": height}
     origin = {"position": {"x": -3.0, "y": -2.0}, "orientation": {"w": 1.0}}

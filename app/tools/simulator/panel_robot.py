@@ -191,6 +191,7 @@ def _message(fields: PanelFields, topic: str, type_name: str) -> Message:
     paths = [path for named in fields.paths.get(topic, ()) for path in field_paths(named)]
     keys = [step for path in paths for step in path_steps(path)]
     wanted = [str(step.value) for step in keys if isinstance(step, Key) and step.path == "name"]
+    wanted += fields.levels_below.get(topic, ())
     is_static = type_name == TF_TYPE and topic.endswith("/tf_static")
     base = (
         static_transforms

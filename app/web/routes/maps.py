@@ -9,11 +9,13 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from app.cell.robot.maps import Grid, overview, reduced, tile
+from app.cell.permission.map_masks import Mask, mask_of
+from app.cell.robot.maps import Grid, mask_tile, overview, reduced, tile
 from app.cell.robot.transforms import Pose
 from app.cell.session.session import RobotSession
-from app.cell.view.map_layer_values import COSTMAP
+from app.cell.view.map_layer_values import COSTMAP, mask_version
 from app.cell.view.map_values import map_view
+from app.panel.widgets.map_layers import MapLayer
 from app.panel.widgets.map_view import MapView
 from app.system.errors import NotFound
 from app.system.texts import say
@@ -57,19 +59,44 @@ async def map_tile(
     state: CurrentState,
     theme: Theme = "light",
 ) -> Response:
+    if (mask := _mask_with(session, widget, version)) is not None:
+        return await _mask_tile(*mask, version, column, row, theme, state)
     costs = version.startswith(COSTMAP)
-    grid = _costmap(session, widget, version) if costs else _grid(session, widget)[1]
-    if (
-        grid is None
-        or version.removeprefix(COSTMAP) != grid.version
-        or column >= grid.columns
-        or row >= grid.rows
-    ):
+    grid = _with_version(session, widget, version.removeprefix(COSTMAP))
+    if grid is None or column >= grid.columns or row >= grid.rows:
         raise NotFound(say("map_changed"))
     picture = await state.fleet.map_pictures.picture(
         (version, column, row, theme), lambda: tile(grid, column, row, theme, costs=costs)
     )
     return _picture(picture, KEPT)
+
+
+async def _mask_tile(
+    layer: MapLayer, mask: Mask, version: str, column: int, row: int, theme: str, state: CurrentState
+) -> Response:
+    grid, marked = mask.grid, mask.marked
+    if column >= grid.columns or row >= grid.rows:
+        raise NotFound(say("map_changed"))
+    picture = await state.fleet.map_pictures.picture(
+        (version, column, row, theme),
+        lambda: mask_tile(grid, column, row, theme, marked, is_hatched=layer.shows == "keep_out"),
+    )
+    return _picture(picture, KEPT)
+
+
+def _mask_with(session: RobotSession, widget: str, version: str) -> tuple[MapLayer, Mask] | None:
+    """The mask of a widget with this version, and its layer; None if there is none now."""
+    view, robot, now = session.panel.widget(widget, MapView), session.robot, time.monotonic()
+    for layer in view.layers:
+        if not version.startswith(f"{layer.shows}-"):
+            continue
+        grid = robot.maps[robot.key(layer.topic)].grid
+        if grid is None:
+            continue
+        mask = mask_of(layer, robot, grid.geometry, now).mask
+        if mask is not None and mask_version(layer, mask) == version:
+            return layer, mask
+    return None
 
 
 @router.get(
@@ -81,8 +108,11 @@ async def map_tile(
 async def map_picture(
     widget: str, session: CurrentSession, state: CurrentState, theme: Theme = "light"
 ) -> Response:
-    view, grid = _grid(session, widget)
+    view = session.panel.widget(widget, MapView)
     shown, _ = map_view(view, session.robot, time.monotonic())
+    grid = _with_version(session, widget, shown["grid"]["version"]) if shown["grid"] else None
+    if grid is None:
+        raise NotFound(shown["note"])
     pose = Pose(*shown["pose"]) if shown["state"] == "live" else None
     pixels = await state.fleet.map_pictures.picture((grid.version, "reduced"), lambda: reduced(grid))
     picture = await state.fleet.map_pictures.picture(
@@ -110,19 +140,11 @@ async def map_routes(widget: str, version: str, request: Request, session: Curre
     return answer
 
 
-def _grid(session: RobotSession, widget: str) -> tuple[MapView, Grid]:
-    view = session.panel.widget(widget, MapView)
-    grid = session.robot.maps[session.robot.key(view.topic)].grid
-    if grid is None:
-        raise NotFound(say("map_waiting"))
-    return view, grid
-
-
-def _costmap(session: RobotSession, widget: str, version: str) -> Grid | None:
-    """The costmap over a map with this version; None if there is none now."""
+def _with_version(session: RobotSession, widget: str, version: str) -> Grid | None:
+    """The map or costmap with this version that a widget shows; None if there is none now."""
     view, maps = session.panel.widget(widget, MapView), session.robot.maps
     grids = (maps[session.robot.key(topic)].grid for topic in view.grids)
-    return next((grid for grid in grids if grid and COSTMAP + grid.version == version), None)
+    return next((grid for grid in grids if grid and grid.version == version), None)
 
 
 def _picture(data: bytes, cache_control: str) -> Response:

@@ -35,6 +35,7 @@ class PlaceCard(BaseModel):
         tuple[float, float, float],
         Field(description="x and y in metres and yaw in radians, in the map's frame"),
     ]
+    level: Annotated[str, Field(description="the id of its level; empty on a map without levels")]
     reason: Annotated[str, Field(description="why it would be refused now; empty if it would not")]
 
 
@@ -67,6 +68,7 @@ async def place(
             for row in card.rows
         ],
         pose=(card.pose.x, card.pose.y, card.pose.yaw),
+        level=card.level,
         reason=render(card.refusal, language),
     )
     return JSONResponse(answer.model_dump(), headers={"cache-control": "no-store"})

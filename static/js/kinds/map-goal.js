@@ -60,7 +60,7 @@ export class Places {
   }
 
   #draw() {
-    this.#places.forEach(({ id, pose, reason }, number) => {
+    this.#places.forEach(({ id, pose, level, reason }, number) => {
       const mark = this.#layer.children[number];
       const { x, y } = this.#view.at(pose[0], pose[1]);
       mark.setAttribute("transform", `translate(${x} ${y})`);
@@ -70,7 +70,7 @@ export class Places {
       name?.setAttribute("x", String((isLeft ? -1 : 1) * (RING_PX - 2)));
       mark.toggleAttribute("data-locked", reason !== "");
       mark.toggleAttribute("data-chosen", id === this.#chosen);
-      mark.toggleAttribute("hidden", !this.#view.version);
+      mark.toggleAttribute("hidden", !this.#view.version || level !== this.#view.level);
     });
   }
 
@@ -80,7 +80,7 @@ export class Places {
     if (!point || PHONE.matches) return null;
     const here = this.#view.at(point.x, point.y);
     const met = this.#places
-      .filter(({ reason }) => !reason)
+      .filter(({ level, reason }) => !reason && level === this.#view.level)
       .map(({ id, pose }) => ({ id, away: distance(here, this.#view.at(pose[0], pose[1])) }))
       .sort((one, other) => one.away - other.away)[0];
     return met && met.away <= NEAR_PX ? met.id : null;
@@ -95,6 +95,7 @@ export class Goal {
   #mark;
   /** @type {number[] | null} */
   #pose = null; // what is chosen
+  #level = ""; // and on which level
   /** @type {number[] | null} */
   #touched = null; // what a finger sets just now
   #radius = 0;
@@ -117,10 +118,15 @@ export class Goal {
     this.#radius = radius;
   }
 
+  // The level that is shown.
+  get level() {
+    return this.#view.level;
+  }
+
   // `isFree`: it would be sent; else the server has a reason against it, or has not answered yet.
-  /** @param {number[] | null} pose @param {boolean} isFree */
-  show(pose, isFree) {
-    this.#pose = pose;
+  /** @param {number[] | null} pose @param {boolean} isFree @param {string} level */
+  show(pose, isFree, level) {
+    [this.#pose, this.#level] = [pose, level];
     this.#mark.toggleAttribute("data-refused", !isFree);
     this.#draw();
   }
@@ -170,7 +176,8 @@ export class Goal {
 
   #draw() {
     const pose = this.#touched ?? this.#pose;
-    this.#mark.toggleAttribute("hidden", !pose || !this.#view.version);
+    const isThere = this.#touched !== null || this.#level === this.#view.level;
+    this.#mark.toggleAttribute("hidden", !pose || !isThere || !this.#view.version);
     this.#mark.toggleAttribute("data-touched", this.#touched !== null);
     if (!pose) return;
     const { x, y } = this.#view.at(pose[0], pose[1]);

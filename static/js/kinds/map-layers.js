@@ -2,6 +2,7 @@
 // them: that choice is the browser's. What the server says is old or has no place is not drawn.
 import { find, setText, svgElement } from "../show.js";
 import { clearedCanvas } from "./map-canvas.js";
+import { openList } from "./map-list.js";
 
 /** @typedef {import("./map.js").Grid} Grid */
 /** @typedef {{ points?: number[], ellipse?: number[], grid?: Grid }} Drawn */
@@ -49,14 +50,8 @@ class Layers {
       this.#check(row, !hidden(this.#name(row)));
       row.addEventListener("click", () => this.#toggle(row));
     }
-    const key = root.querySelector("button[data-do='layers']");
-    key?.addEventListener("click", () => this.#open(!this.#isOpen));
-    find(root, ".map-view").addEventListener("pointerdown", () => {
-      if (this.#isOpen) this.#open(false);
-    });
-    root.querySelector(".map-list")?.addEventListener("keydown", (event) => {
-      if (/** @type {KeyboardEvent} */ (event).key === "Escape") this.#open(false);
-    });
+    const list = /** @type {HTMLElement | null} */ (root.querySelector(".map-list"));
+    if (list) openList(root, "layers", list);
     new MutationObserver(() => this.#reload()).observe(document.documentElement, { attributeFilter: ["data-theme"] });
     view.onDraw(() => this.#draw());
   }
@@ -91,18 +86,6 @@ class Layers {
     hide(this.#name(row), !isShown);
     this.#note();
     this.#view.draw();
-  }
-
-  get #isOpen() {
-    return this.#root.querySelector("div.map-list")?.hidden === false;
-  }
-
-  /** @param {boolean} isOpen */
-  #open(isOpen) {
-    const key = find(this.#root, "button[data-do='layers']");
-    find(this.#root, ".map-list").hidden = !isOpen;
-    key.setAttribute("aria-expanded", String(isOpen));
-    if (!isOpen) key.focus();
   }
 
   // What is wrong with the first layer that the operator has not hidden.
@@ -157,8 +140,9 @@ class Layers {
   #draw() {
     this.#drawBody();
     for (const row of this.#fixed) {
-      const isShown = row.getAttribute("aria-pressed") === "true" && Boolean(this.#view.version);
-      find(this.#root, `.map-${row.dataset.fixed}`).toggleAttribute("hidden", !isShown);
+      const drawn = find(this.#root, `.map-${row.dataset.fixed}`);
+      const isThere = Boolean(this.#view.version) && drawn.dataset.level === this.#view.level;
+      drawn.toggleAttribute("hidden", row.getAttribute("aria-pressed") !== "true" || !isThere);
     }
     if (!this.#rows.length) return;
     for (const [index, { grid, tiles }] of this.#costs) {

@@ -2,9 +2,10 @@
 // its row in the list, opens the robot's page.
 import { find, setText, svgElement } from "../show.js";
 import { follow } from "./map-goal.js";
+import { openList } from "./map-list.js";
 
 /** @typedef {import("./map.js").MapView} MapView */
-/** @typedef {{ robot: string, name: string, label: string, state: string, note: string, pose: number[] | null }} Robot */
+/** @typedef {{ robot: string, name: string, label: string, state: string, note: string, level: string, pose: number[] | null }} Robot */
 
 const NEAR_PX = 26; // around a robot that a finger meets
 const LEAST_PX = 11; // its radius, however small the map
@@ -34,14 +35,7 @@ class Robots {
     this.#root = root;
     this.#view = view;
     find(root, ".map-robot").before(this.#marks);
-    const key = find(root, 'button[data-do="robots"]');
-    key.addEventListener("click", () => this.#open(Boolean(this.#list.hidden)));
-    find(root, ".map-view").addEventListener("pointerdown", () => {
-      if (!this.#list.hidden) this.#open(false);
-    });
-    this.#list.addEventListener("keydown", ({ key: name }) => {
-      if (name === "Escape") this.#open(false);
-    });
+    openList(root, "robots", this.#list);
     view.onDraw(() => this.#draw());
     view.onPointer((event) => this.#take(event), true);
   }
@@ -79,19 +73,11 @@ class Robots {
     return /** @type {HTMLAnchorElement | null} */ (this.#list.querySelector(`a[data-on-map="${robot}"]`));
   }
 
-  /** @param {boolean} isOpen */
-  #open(isOpen) {
-    const key = find(this.#root, 'button[data-do="robots"]');
-    this.#list.hidden = !isOpen;
-    key.setAttribute("aria-expanded", String(isOpen));
-    if (!isOpen) key.focus();
-  }
-
   #draw() {
     const radius = Math.max(Number(this.#root.dataset.radius) * this.#view.perMetre, LEAST_PX);
-    this.#robots.forEach(({ label, state, pose }, number) => {
+    this.#robots.forEach(({ label, state, level, pose }, number) => {
       const mark = this.#marks.children[number];
-      mark.toggleAttribute("hidden", !pose || !this.#view.version);
+      mark.toggleAttribute("hidden", !pose || !this.#view.version || level !== this.#view.level);
       mark.setAttribute("data-state", state);
       if (!pose) return;
       const { x, y } = this.#view.at(pose[0], pose[1]);
@@ -129,7 +115,8 @@ class Robots {
       const { x, y } = this.#view.at(pose[0], pose[1]);
       return Math.hypot(x - finger.x, y - finger.y);
     };
-    const [nearest] = [...this.#robots].sort((first, second) => away(first.pose) - away(second.pose));
+    const drawn = this.#robots.filter(({ level }) => level === this.#view.level);
+    const [nearest] = drawn.sort((first, second) => away(first.pose) - away(second.pose));
     const limit = Math.min(NEAR_PX, away(this.#view.pose));
     return nearest && away(nearest.pose) < limit ? nearest.robot : "";
   }

@@ -10,6 +10,7 @@ const shown = new WeakMap();
 
 /** @param {HTMLElement} root @param {import("./map.js").MapView} view @param {Zone[]} zones */
 export function showZones(root, view, zones) {
+  if (shown.get(root) === zones) return;
   const isFirst = !shown.has(root);
   shown.set(root, zones);
   const marks = root.querySelector("svg.map-marks");

@@ -44,11 +44,24 @@ export const show = {
   pose: (root, pose) => views.get(root)?.showPose(pose),
   zones: async (root, zones) => {
     const view = views.get(root);
-    if (view && zones.length) (await import("./map-zones.js")).showZones(root, view, zones);
+    if (!view) return;
+    if (root.dataset.level !== undefined) (await import("./map-levels.js")).levelsOf(root, view).showZones(zones);
+    else if (zones.length) (await import("./map-zones.js")).showZones(root, view, zones);
   },
   routes: async (root, routes) => {
     const view = views.get(root);
     if (view) (await import("./map-routes.js")).showRoutes(root, view, routes);
+  },
+  level: (root, level) => {
+    root.dataset.level = level;
+  },
+  levels: async (root, levels) => {
+    const view = views.get(root);
+    if (view) (await import("./map-levels.js")).levelsOf(root, view).show(levels);
+  },
+  level_note: async (root, note) => {
+    const view = views.get(root);
+    if (view) (await import("./map-levels.js")).levelsOf(root, view).tell(note);
   },
   robots: async (root, robots) => {
     const view = views.get(root);
@@ -72,6 +85,10 @@ export class MapView {
   #view;
   /** @type {HTMLElement} */
   #tiles;
+  /** @type {Grid | null} */
+  #ofRobot = null; // the map that the robot is on
+  /** @type {{ id: string, grid: Grid | null } | null} */
+  #level = null; // another level, that the operator looks at
   /** @type {Grid | null} */
   #newest = null;
   /** @type {Grid | null} */
@@ -115,9 +132,29 @@ export class MapView {
 
   /** @param {Grid | null} grid */
   showGrid(grid) {
+    this.#ofRobot = grid;
+    this.#take();
+  }
+
+  // Another level than the robot's, where the robot is not drawn; null: that of the robot.
+  /** @param {{ id: string, grid: Grid | null } | null} level */
+  showLevel(level) {
+    if (level?.id !== this.#level?.id) [this.#isWhole, this.#follows] = [true, false];
+    this.#level = level;
+    this.#root.toggleAttribute("data-elsewhere", level !== null);
+    this.#take();
+  }
+
+  #take() {
     const before = this.#newest?.version;
-    this.#newest = grid;
-    if (grid?.version !== before) this.#load();
+    this.#newest = this.#level ? this.#level.grid : this.#ofRobot;
+    if (this.#newest?.version !== before) this.#load();
+    this.#draw();
+  }
+
+  // The level that is shown, "" on a map without levels, and while the robot's is not known.
+  get level() {
+    return this.#level?.id ?? this.#root.dataset.level ?? "";
   }
 
   /** @param {number[] | null} pose */
@@ -131,9 +168,9 @@ export class MapView {
     return this.#grid?.version ?? "";
   }
 
-  // Where the robot is, or was last: x, y and yaw in metres and radians; null if that is not known.
+  // Where the robot is on what is shown, or was last: x, y and yaw in metres and radians; null if that is not known.
   get pose() {
-    return this.#pose;
+    return this.#level ? null : this.#pose;
   }
 
   // How many pixels a metre is.
@@ -223,7 +260,7 @@ export class MapView {
   #show(grid, layer) {
     [this.#grid, this.#layer] = [grid, layer];
     this.#tiles.replaceChildren(...(layer ? [layer] : []));
-    for (const key of this.#root.querySelectorAll(".map-keys > button")) key.disabled = !grid;
+    for (const key of this.#root.querySelectorAll(".map-keys > button:not(.map-level)")) key.disabled = !grid;
     find(this.#root, ".map-scale").hidden = !grid;
     this.#root.dataset.version = grid?.version ?? "";
     this.#draw();
@@ -238,15 +275,16 @@ export class MapView {
     const grid = this.#grid;
     const robot = find(this.#root, ".map-robot");
     const unsure = find(this.#root, ".map-unsure");
-    for (const mark of [robot, unsure]) mark.toggleAttribute("hidden", !grid || !this.#pose);
+    const pose = this.pose;
+    for (const mark of [robot, unsure]) mark.toggleAttribute("hidden", !grid || !pose);
     if (!grid || !this.#view.clientWidth) return;
     if (this.#isWhole) this.#fit(grid);
-    if (this.#follows && this.#pose) this.#centre = { x: this.#pose[0], y: this.#pose[1] };
+    if (this.#follows && pose) this.#centre = { x: pose[0], y: pose[1] };
     if (this.#layer) this.placeTiles(this.#layer, grid);
-    if (this.#pose) {
-      const place = this.at(this.#pose[0], this.#pose[1]);
+    if (pose) {
+      const place = this.at(pose[0], pose[1]);
       const radius = Math.max(Number(this.#root.dataset.radius) * this.#perMetre, LEAST_ROBOT_PX);
-      const turn = (-this.#pose[2] * 180) / Math.PI;
+      const turn = (-pose[2] * 180) / Math.PI;
       robot.setAttribute("transform", `translate(${place.x} ${place.y}) rotate(${turn}) scale(${radius})`);
       unsure.setAttribute("transform", `translate(${place.x} ${place.y})`);
     }
@@ -382,7 +420,7 @@ export class MapView {
 
   /** @param {string | undefined} what */
   #do(what) {
-    if (what === "layers" || what === "robots") return;
+    if (what === "layers" || what === "levels" || what === "robots") return;
     if (what === "in") this.#zoom(STEP);
     else if (what === "out") this.#zoom(1 / STEP);
     else if (what === "whole") [this.#isWhole, this.#follows] = [true, false];

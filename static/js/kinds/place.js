@@ -4,8 +4,8 @@ import { closest, copyOf, find, isGood, setText, showGroupOf } from "../show.js"
 import { viewOf } from "./map.js";
 import { Goal, Places } from "./map-goal.js";
 
-/** @typedef {{ id: string, label: string, icon: string, pose: number[], distance: string, reason: string }} Place */
-/** @typedef {{ value: string, name: string, rows: { name: string, text: string }[], pose: number[], reason: string }} Card */
+/** @typedef {{ id: string, label: string, icon: string, pose: number[], level: string, distance: string, reason: string }} Place */
+/** @typedef {{ value: string, name: string, rows: { name: string, text: string }[], pose: number[], level: string, reason: string }} Card */
 
 const AGAIN_MS = 1000; // between two cards of the same choice
 const LATE_MS = 3000; // without a card nothing is chosen
@@ -101,7 +101,7 @@ class PlaceInput {
   choose(value, pose) {
     this.#enter(null);
     if (!value) return;
-    if (pose) this.#goal?.show(pose, false);
+    if (pose) this.#goal?.show(pose, false, this.#goal.level);
     this.#ask(value).then(
       (card) => {
         if (!card) return;
@@ -180,7 +180,7 @@ class PlaceInput {
     setText(find(this.#card, ".refusal"), card?.reason ?? "");
     this.#offerSave(card);
     this.#draw();
-    this.#goal?.show(card?.pose ?? null, card !== null && !card.reason);
+    this.#goal?.show(card?.pose ?? null, card !== null && !card.reason, card?.level ?? "");
     this.#symbols?.show(this.#places, card?.value ?? "");
   }
 

@@ -100,7 +100,7 @@ def zone(**more: Any) -> Zone:
     ],
 )
 def test_a_circle_that_touches_a_keep_out_zone_is_in_it(x: float, y: float, is_in: bool) -> None:
-    assert (KeepOut([zone()]).at("a" * 16, x, y, 0.3) is not None) == is_in
+    assert (KeepOut([zone()]).at("a" * 16, "", x, y, 0.3) is not None) == is_in
 
 
 @pytest.mark.parametrize(
@@ -115,13 +115,22 @@ def test_a_circle_that_touches_a_keep_out_zone_is_in_it(x: float, y: float, is_i
 def test_a_hole_is_not_of_the_zone(x: float, y: float, is_in: bool) -> None:
     square = [[0, 0], [3, 0], [3, 3], [0, 3]]
     with_hole = zone(points=square, holes=[[[1, 0.5], [2, 0.5], [2, 2], [1, 2]]])
-    assert (KeepOut([with_hole]).at("a" * 16, x, y, 0.3) is not None) == is_in
+    assert (KeepOut([with_hole]).at("a" * 16, "", x, y, 0.3) is not None) == is_in
 
 
 def test_other_zones_and_those_of_other_maps_are_only_shown() -> None:
     others = [zone(kind="speed"), zone(kind="label"), zone(map_version="b" * 16)]
-    assert KeepOut(others).at("a" * 16, 1.0, 0.5, 0.3) is None
-    assert KeepOut(others).at("b" * 16, 1.0, 0.5, 0.3) is others[-1]
+    assert KeepOut(others).at("a" * 16, "", 1.0, 0.5, 0.3) is None
+    assert KeepOut(others).at("b" * 16, "", 1.0, 0.5, 0.3) is others[-1]
+
+
+@pytest.mark.parametrize(
+    ("level", "on", "is_in"),
+    [(None, "", True), (None, "upper", True), ("upper", "upper", True), ("upper", "ground", False)],
+)
+def test_a_zone_counts_on_its_level_or_on_each(level: str | None, on: str, is_in: bool) -> None:
+    hit = KeepOut([zone(level=level)]).at("a" * 16, on, 1.0, 0.5, 0.3)
+    assert (hit is not None) == is_in
 
 
 def test_corners_are_looked_at_once_for_a_circle_and_only_of_zones_near_it(
@@ -138,7 +147,7 @@ def test_corners_are_looked_at_once_for_a_circle_and_only_of_zones_near_it(
     far = [[100, 0], [104, 0], [104, 2]]
     keep_out = KeepOut([zone(id="far", points=far), zone()])
     for _ in range(3):
-        hit = keep_out.at("a" * 16, 1.0, 0.5, 0.3)
+        hit = keep_out.at("a" * 16, "", 1.0, 0.5, 0.3)
         assert hit is not None
         assert hit.id == "z"
     assert len(looked) == 1

@@ -52,6 +52,7 @@ def test_another_robot_is_where_its_own_transforms_say() -> None:
         "label": "Robot 2",
         "state": "live",
         "pose": [3.5, 2.0, 0.0],
+        "level": "",
         "note": "",
     }
     assert note == ""
