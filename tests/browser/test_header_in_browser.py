@@ -9,6 +9,8 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from app.cell.view.clock_status import BANNERS
+from app.system.texts.catalogue import sentences
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
 from tests.support.parts import ROOT, SHIPPED, Server, until
@@ -25,6 +27,8 @@ logo = "acme.svg"
 text = "ACME"
 colour = "#0b6b57"
 """
+SAYS: Final = "(banner, text) => { banner.textContent = text; }"
+IS_WHOLE: Final = "(title) => title.scrollWidth <= title.clientWidth"
 LINE_PX: Final = 14  # the height of a line of who has control
 CONTROL: Final = """
 [control]
@@ -61,6 +65,12 @@ def controlled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield mine
 
 
+@pytest.fixture(scope="module")
+def plain() -> Iterator[Server]:
+    with ready(Server(ROOT, KIOSK_PANEL=str(PALLETIZER))) as mine:
+        yield mine
+
+
 @pytest.fixture
 def story(tmp_path: Path) -> Iterator[Server]:
     """All that a header may have: brand, state with details, who has control. No browser has it yet."""
@@ -91,6 +101,21 @@ def test_parts_of_the_header_have_room(
             assert settled(page, CROWDED) == [], (server is branded, width)
             expect(page.locator("#clock")).to_be_visible()
             expect(page.locator("#day")).to_be_visible(visible=width >= 900)
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_no_banner_of_a_simulated_robot_cuts_the_title(
+    plain: Server, page: Page, language: str
+) -> None:
+    page.context.add_cookies([{"name": "kiosk_language", "value": language, "url": plain.url}])
+    page.goto(plain.url)
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    for width, height in SIZES:
+        for code in BANNERS.values():
+            page.locator("#banner").evaluate(SAYS, sentences(language)[code])
+            sized(page, width, height).evaluate(DRAWN)
+            assert settled(page, CROWDED) == [], (code, width)
+            assert page.locator("h1 span").evaluate(IS_WHOLE), (code, width)
 
 
 def test_a_header_without_a_robot_has_room_for_the_menu(chromium: Browser) -> None:
