@@ -82,6 +82,7 @@ NUMBER: Final = "std_msgs/msg/Float32"
 TEXT: Final = "std_msgs/msg/String"
 TRIGGER: Final = "std_srvs/srv/Trigger"
 SWITCH: Final = "std_srvs/srv/SetBool"
+SPEED_LIMIT: Final = "nav2_msgs/msg/SpeedLimit"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,6 +180,8 @@ DRIVING: Final = Story(
         "/docked": BOOL,
         "/way_blocked": BOOL,
         "/obstacle": BOOL,
+        "/speed_limit": SPEED_LIMIT,
+        "/collision_monitor_state": "nav2_msgs/msg/CollisionMonitorState",
         "/safety/estop_released": BOOL,
         "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
         "/rosout": "rcl_interfaces/msg/Log",
@@ -187,6 +190,7 @@ DRIVING: Final = Story(
         "/stop": "std_msgs/msg/Empty",
         "/cmd_vel_teleop": "geometry_msgs/msg/TwistStamped",
         "/initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "/speed_limit": SPEED_LIMIT,
     },
     services={"/manual_mode": SWITCH, "/obstacle": SWITCH},
     actions={

@@ -70,6 +70,17 @@ def test_blocked_way_is_an_alarm_and_the_goal_says_why_it_ends(shuttle: Server, 
     put_box(page, shuttle, "off")
 
 
+def test_speed_limit_is_a_step_that_the_robot_reports(shuttle: Server, page: Page) -> None:
+    page.goto(f"{shuttle.url}/pages/status")
+    limit = widget(page, "speed_limit")
+    expect(limit).to_contain_text("100")
+    expect(widget(page, "collision_lamp")).to_contain_text("Free")
+    limit.locator("button").first.click()
+    expect(limit).to_contain_text("80")
+    limit.locator("button").last.click()
+    expect(limit).to_contain_text("100")
+
+
 def test_cancel_ends_the_goal_and_the_robot_stands(shuttle: Server, page: Page) -> None:
     opened(page, shuttle)
     send(page, "palletizer_1")

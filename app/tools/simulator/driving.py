@@ -22,6 +22,8 @@ from app.tools.simulator.hall import (
 )
 from app.tools.simulator.known_types import Moment, stamp
 from app.tools.simulator.mobile_robot import (
+    COLLISION_SLOW,
+    COLLISION_STOP,
     HALF_LENGTH,
     HALF_WIDTH,
     OBSTACLE_M,
@@ -61,6 +63,7 @@ LIDAR_AHEAD: Final = 0.3
 COSTMAP_CELLS: Final = 60
 INFLATION_M: Final = 0.8
 OK, WARN = 0, 1
+POLYGONS: Final = {COLLISION_STOP: "PolygonStop", COLLISION_SLOW: "PolygonSlow"}
 CHARGING, DISCHARGING, NOT_CHARGING, FULL = 1, 2, 3, 4
 
 
@@ -248,6 +251,14 @@ def _parts(robot: MobileRobot) -> list[Fields]:
     ]
 
 
+def _speed_limit(percent: float, moment: Moment) -> Fields:
+    return {"header": _header(moment, "map"), "percentage": True, "speed_limit": percent}
+
+
+def _collision(action: int, _: Moment) -> Fields:
+    return {"action_type": action, "polygon_name": POLYGONS.get(action, "")}
+
+
 RobotTopic = StoryTopic[MobileRobot]
 
 
@@ -296,6 +307,8 @@ TOPICS: Final[Mapping[str, RobotTopic]] = {
     "/docked": RobotTopic(lambda robot: robot.is_docked),
     "/way_blocked": RobotTopic(lambda robot: robot.is_blocked),
     "/obstacle": RobotTopic(lambda robot: robot.has_visitors_obstacle),
+    "/speed_limit": RobotTopic(lambda robot: robot.limit, _speed_limit),
+    "/collision_monitor_state": RobotTopic(lambda robot: robot.collision, _collision),
     "/safety/estop_released": RobotTopic(lambda _: True),
     "/diagnostics": RobotTopic(
         _parts,
@@ -437,6 +450,8 @@ class PlayedDriving(PlayedStory):
                 self.robot.teleop(message.twist.linear.x, message.twist.angular.z)
             case "/initialpose":
                 self.robot.set_pose(_read_pose(message.pose.pose))
+            case "/speed_limit":
+                self.robot.limit_speed(message.speed_limit, is_percentage=message.percentage)
 
     def serve(self, service: str, request: Any) -> Fields:
         set_it = {"/manual_mode": self._set_manual, "/obstacle": self._put_obstacle}[service]

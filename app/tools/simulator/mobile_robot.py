@@ -84,6 +84,7 @@ BLOCKED_EACH: Final = 3  # long trips
 LONG_TRIP_M: Final = 8.0
 STEPS_ASIDE_S: Final = 6.0
 OBSTACLE_M: Final = 0.35  # its radius
+SLOW: Final = 0.5  # of its speed, before what is in its way
 
 # The battery: of eight hours on the way, of fifteen minutes at the charger.
 DRIVING_PER_S: Final = 1 / (8 * 3600)
@@ -155,6 +156,9 @@ class Obstacle:
     until: float
 
 
+# nav2_msgs/msg/CollisionMonitorState
+COLLISION_NONE, COLLISION_STOP, COLLISION_SLOW = 0, 1, 2
+
 LOG_INFO, LOG_WARN, LOG_ERROR = 20, 30, 40  # rcl_interfaces/msg/Log
 
 
@@ -174,6 +178,7 @@ class MobileRobot:
         self.t = 0.0
         self.pose = START
         self.speed_m_s = SPEED_M_S  # on free ways
+        self.limit = 100.0  # percent of that
         self.speed = self.turning = 0.0  # m/s, rad/s
         self.driven = 0.0  # metres
         self.charge = FIRST_CHARGE
@@ -205,6 +210,21 @@ class MobileRobot:
     @property
     def is_blocked(self) -> bool:
         return self._blocked_since is not None
+
+    @property
+    def collision(self) -> int:
+        """What the collision monitor does."""
+        if self.is_blocked:
+            return COLLISION_STOP
+        if self.task is None or self.obstacle is None:
+            return COLLISION_NONE
+        is_near = math.dist(self.obstacle.at, self.pose[:2]) <= SEES_M + OBSTACLE_M
+        return COLLISION_SLOW if is_near else COLLISION_NONE
+
+    def limit_speed(self, value: float, *, is_percentage: bool) -> None:
+        """A speed limit, in percent of its greatest speed or in m/s; 0 is none."""
+        percent = value if is_percentage else 100 * value / self.speed_m_s
+        self.limit = percent if 0 < percent < 100 else 100.0
 
     @property
     def moves(self) -> bool:
@@ -413,7 +433,9 @@ class MobileRobot:
             return
         straight = self._turn_to(heading, dt, STRAIGHT_RAD)
         rest = math.sqrt(2 * ACCELERATION * max(length - self._gone, 0.005))
-        wanted = min(leg.speed or self.speed_m_s, rest) if straight else 0.0
+        most = min(leg.speed or self.speed_m_s, self.speed_m_s * self.limit / 100)
+        most *= SLOW if self.collision == COLLISION_SLOW else 1.0
+        wanted = min(most, rest) if straight else 0.0
         change = ACCELERATION * dt
         now = abs(self.speed)
         now = min(wanted, now + change) if wanted > now else max(wanted, now - 3 * change)

@@ -150,6 +150,32 @@ def test_box_in_the_way_is_reported_and_ends_the_goal(robot: Stepped) -> None:
     assert end(robot) == (ABORTED, {"error_code": FOLLOW_NO_PROGRESS})
 
 
+def test_collision_monitor_slows_the_robot_before_a_box_and_stops_it(robot: Stepped) -> None:
+    assert newest(robot, "/collision_monitor_state").action_type == 0
+    assert robot.call("/obstacle", data=True).success
+    robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(12)
+    told = dict.fromkeys(robot.values("/collision_monitor_state", "action_type"))
+    assert [*told] == [0, 2, 1]
+    assert newest(robot, "/collision_monitor_state").polygon_name == "PolygonStop"
+    near = max(robot.values("/odom", "twist.twist.linear.x")[-60:])
+    assert near <= 0.5 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("percentage", "limit", "percent", "most"),
+    [(True, 40.0, 40.0, 0.4), (False, 0.6, 60.0, 0.6), (True, 0.0, 100.0, 1.0)],
+)
+def test_speed_limit_is_obeyed_and_reported(
+    robot: Stepped, percentage: bool, limit: float, percent: float, most: float
+) -> None:
+    robot.hear("/speed_limit", percentage=percentage, speed_limit=limit)
+    robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
+    robot.run(6)
+    assert newest(robot, "/speed_limit").speed_limit == pytest.approx(percent)
+    assert max(robot.values("/odom", "twist.twist.linear.x")) == pytest.approx(most, abs=0.01)
+
+
 def test_stop_of_the_panel_ends_the_goal(robot: Stepped) -> None:
     robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
     robot.run(3)
