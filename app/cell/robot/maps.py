@@ -28,6 +28,7 @@ FRAME_AT: Final = 12  # in a message: after the encapsulation and the stamp
 TIME_BYTES: Final = 8
 OCCUPIED: Final = 65  # percent and more, as Nav2's map server has it
 FREE: Final = 25  # percent and less
+TOO_FAST: Final = 5  # maps that were replaced before they were read
 MAX_OVERVIEW: Final = 1_000  # pixels a side of the picture of the whole map
 
 # The picture's colours are numbers of a palette. Unknown cells are transparent: the page draws dots
@@ -142,12 +143,19 @@ class Arrival:
 class MapState(Arrival):
     """The newest map of a topic. `updated_at` (monotonic seconds) is when its newest update arrived,
     `doubt` why cells may not be the robot's of now although the map is: updates were lost. `is_behind`:
-    a newer map has arrived and is not read yet."""
+    a newer map has arrived that is not read yet, and is not known to be the same; `overtaken` is how
+    many such were replaced by a newer one, since all were read last."""
 
     grid: Grid | None = None
     is_behind: bool = False
+    overtaken: int = 0
     updated_at: float = -math.inf
     doubt: TextLike = ""
+
+    @property
+    def is_too_fast(self) -> bool:
+        """Whether the map changes faster than it can be read."""
+        return self.overtaken >= TOO_FAST
 
 
 def read_grid(interfaces: Interfaces, payload: bytes) -> Grid:

@@ -10,7 +10,7 @@ from typing import Final
 
 from app.cell.link.peer import RobotContext
 from app.cell.robot.map_layers import read_shape
-from app.cell.robot.maps import COMPARED, MapState, NoMap, is_repeated, read_grid, updated
+from app.cell.robot.maps import COMPARED, Grid, MapState, NoMap, is_repeated, read_grid, updated
 from app.cell.robot.sample_handlers import SampleHandler, SampleHandlers
 from app.cell.robot.transforms import TF, TF_STATIC
 from app.panel.widgets.map_layers import updates_of
@@ -43,6 +43,7 @@ class MapListener:
         self._changed = changed
         self._newest: dict[str, Sample] = {}  # not read yet
         self._reading: set[str] = set()
+        self._comparing: set[str] = set()
         uses_transforms = any(view.uses_transforms for view in panel.map_views.values())
         topics = (TF, TF_STATIC) if uses_transforms else ()
         self._static = {robot.key(topic): topic == TF_STATIC for topic in topics}
@@ -78,15 +79,38 @@ class MapListener:
 
     def take_map(self, key: str, sample: Sample) -> None:
         """A map or a layer; the one before it is not read if it waits."""
-        self._newest[key] = sample
         if (state := self._robot.maps.get(key)) is not None:
-            state.is_behind = not self._is_repeated(state, sample)
+            is_large = len(sample.payload) >= COMPARED
+            state.is_behind = is_large or not is_repeated(state.grid, bytes(sample.payload))
+            state.overtaken += state.is_behind and key in self._newest
+            if is_large and key not in self._comparing:
+                self._comparing.add(key)
+                spawn_logged(self._compare(key, state), log, "comparing a map failed")
+        self._newest[key] = sample
         self._begin(key)
 
+    async def _compare(self, key: str, state: MapState) -> None:
+        """Finds out beside the event loop whether the newest large map is the one that was read last:
+        then it need not be read, and nothing waits for a pause between two maps."""
+        try:
+            while (sample := self._newest.get(key)) is not None:
+                grid = state.grid
+                is_same = await asyncio.to_thread(_is_same, grid, sample)
+                if self._newest.get(key) is not sample or state.grid is not grid:
+                    continue  # a newer one, or it is being read
+                if is_same:
+                    del self._newest[key]
+                    self._take_arrival(state, sample)
+                    state.is_behind, state.overtaken = False, 0
+                    self._changed(key)
+                return
+        finally:
+            self._comparing.discard(key)
+
     @staticmethod
-    def _is_repeated(state: MapState, sample: Sample) -> bool:
-        """Whether a sample is the map that was read last. A large one is not copied to find out."""
-        return len(sample.payload) < COMPARED and is_repeated(state.grid, bytes(sample.payload))
+    def _take_arrival(state: MapState, sample: Sample) -> None:
+        state.wall, state.at, state.source = sample.wall, sample.at, sample.source
+        state.doubt = ""
 
     def _take_update(self, key: str, sample: Sample) -> None:
         """An update of a map: all count that came after it."""
@@ -119,6 +143,8 @@ class MapListener:
                     pause_s = max(PAUSE_S, tiles / TILES_PER_S)
                 self._changed(key)
                 await asyncio.sleep(max(pause_s, 4 * (time.monotonic() - began)))
+            if (state := self._robot.maps.get(key)) is not None:
+                state.overtaken = 0
         finally:
             self._reading.discard(key)
 
@@ -138,8 +164,7 @@ class MapListener:
             state.doubt = problem
 
     async def _read_grid(self, state: MapState, sample: Sample) -> None:
-        state.wall, state.at, state.source = sample.wall, sample.at, sample.source
-        state.doubt = ""
+        self._take_arrival(state, sample)
         try:
             grid = await asyncio.to_thread(lambda: read_grid(self._interfaces, bytes(sample.payload)))
         except NoMap as error:
@@ -189,3 +214,7 @@ class MapPictures:
             return picture
         finally:
             del self._making[key]
+
+
+def _is_same(grid: Grid | None, sample: Sample) -> bool:
+    return is_repeated(grid, bytes(sample.payload))

@@ -56,7 +56,8 @@ def _on_level(
         for layer in widget.layers
     ]
     routes = _routes(widget, robot, level)
-    warnings = [layer.attributes["warning"] for layer in layers]
+    too_fast = say("map_too_fast") if state.is_too_fast else ""
+    warnings = [too_fast, *(layer.attributes["warning"] for layer in layers)]
     warnings += [each["note"] for each in routes.values()]
     ellipses = [layer.attributes["ellipse"] for layer in layers if "ellipse" in layer.attributes]
     return {
@@ -66,7 +67,7 @@ def _on_level(
         "pose": None if shown.pose is None else [round(part, PLACES) for part in shown.pose],
         "zones": _zones(level, state.grid, robot),
         "about": _about(state.wall, ellipses if shown.pose is not None and not shown.note else []),
-        "detail": _detail(geometry),
+        "detail": too_fast or _detail(geometry),
         "layer_note": next(filter(None, warnings), ""),
         **{f"layer_{number}": dict(layer.attributes) for number, layer in enumerate(layers)},
         **routes,

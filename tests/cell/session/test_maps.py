@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.cell.robot.maps import GRID_TYPE
+from app.cell.robot.maps import GRID_TYPE, TOO_FAST
 from app.cell.session import maps
 from app.cell.session.maps import MapListener, MapPictures
 from app.ros.zenoh.sample import Sample
@@ -94,6 +94,44 @@ async def test_the_same_map_again_is_the_same_picture(monkeypatch: pytest.Monkey
     assert not listening.robot.maps["map"].is_behind
     await listening.reported(2)
     assert listening.robot.maps["map"].grid is first
+
+
+@in_a_loop
+async def test_a_large_map_that_comes_again_and_again_is_never_behind_for_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(maps, "COMPARED", 100)
+    monkeypatch.setattr(maps, "PAUSE_S", 60.0)  # after the first
+    listening = Listening()
+    listening.listener.take_map("map", sample(payload(5, side=40)))
+    await listening.reported(1)
+    state = listening.robot.maps["map"]
+    first = state.grid
+    for number in range(2, 6):
+        listening.listener.take_map("map", sample(payload(5, side=40, sec=number), number))
+        assert state.is_behind  # until it is compared
+        await listening.reported(number)
+        assert (state.is_behind, state.grid, state.overtaken) == (False, first, 0)
+    listening.listener.take_map("map", sample(payload(6, side=40), 9))
+    await asyncio.sleep(0.05)
+    assert (state.is_behind, state.grid) == (True, first)
+
+
+@in_a_loop
+async def test_a_map_that_changes_faster_than_it_is_read_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(maps, "PAUSE_S", 0.2)
+    listening = Listening()
+    state = listening.robot.maps["map"]
+    for value in range(2 * TOO_FAST):
+        listening.listener.take_map("map", sample(payload(value), value))
+    assert state.is_too_fast
+    await listening.reported(1)
+    async with asyncio.timeout(20):
+        while state.is_too_fast:  # all that came are read
+            await asyncio.sleep(0.01)
+    assert (state.is_behind, state.overtaken) == (False, 0)
 
 
 @in_a_loop

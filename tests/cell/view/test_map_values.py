@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.cell.robot.maps import GRID_TYPE, read_grid
+from app.cell.robot.maps import GRID_TYPE, TOO_FAST, read_grid
 from app.cell.robot.state import RobotState, Sample
 from app.cell.view.map_values import map_view
 from app.cell.view.view import build_view
@@ -153,6 +153,14 @@ def test_after_a_cut_the_map_is_old_until_it_comes_again() -> None:
     assert shown(panel, robot)["state"] == "old"
     robot.maps["map"].at = time.monotonic()  # as the listener does with the next map
     assert shown(panel, robot)["state"] == "live"
+
+
+def test_a_map_that_changes_too_fast_says_so() -> None:
+    panel, robot = robot_with()
+    moved(robot, 1.0)
+    robot.maps["map"].overtaken = TOO_FAST
+    view = shown(panel, robot)
+    assert view["detail"] == view["layer_note"] == "The map changes faster than it can be read"
 
 
 def test_a_map_of_another_session_is_not_the_robots() -> None:
