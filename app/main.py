@@ -7,7 +7,6 @@ gc.disable()  # until the application is made: collections while it is imported 
 
 import asyncio
 import logging
-import secrets
 import sys
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
@@ -16,8 +15,7 @@ from functools import partial
 from importlib import import_module
 from typing import Final
 
-from fastapi import APIRouter, Depends, FastAPI
-from starlette.middleware.gzip import GZipMiddleware
+from fastapi import APIRouter, FastAPI
 from uvicorn import Config as ServerConfig
 
 from app.cell.commands.judge import PressLimits
@@ -27,7 +25,6 @@ from app.cell.session.assembly import check_zenoh, data_folder, mode_of, open_fl
 from app.cell.session.doctor_process import DoctorProcess
 from app.panel import Panel, load_panel
 from app.panel.checks.look import page_parts
-from app.panel.rules import EmbedRules
 from app.panel.widgets.kinds import KINDS
 from app.system import log as ros_logging
 from app.system.concurrency import keep_running, spawn_logged
@@ -39,23 +36,13 @@ from app.system.process.shutdown import graceful_shutdown
 from app.system.settings import PACKAGE, Settings, shipped_path
 from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
-from app.web.asgi import Application, ReadableStartupErrors
-from app.web.assets import load_assets, require_files
-from app.web.caller import LanguageHeaders
-from app.web.error_pages import HANDLERS, on_error_in_development
+from app.web.application import load_pages, new_application, page_assets, page_revision
 from app.web.metrics import Metrics
 from app.web.pages.compiled_templates import COMPILED
 from app.web.pages.page_templates import PageTemplates
-from app.web.path_methods import method_guard
-from app.web.requests import LONGEST
-from app.web.root_path import RootPath, root_path_of
-from app.web.route_needs import route_guard
-from app.web.route_tables import LateRoutes, add_routes, load_used
-from app.web.routes import pages
-from app.web.security import BearerGuard, RequestGuard
+from app.web.root_path import root_path_of
 from app.web.server import (
     Connection,
-    Proxies,
     check_port,
     check_protected,
     count_repeated,
@@ -64,7 +51,6 @@ from app.web.server import (
     urls,
 )
 from app.web.session_end import follow_users
-from app.web.turns import Turns
 
 log = logging.getLogger("kiosk")
 
@@ -79,19 +65,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     repeated = limit_server_log(settings.log_level == "debug")
     panel = load_panel(settings.panel)
     check_zenoh(settings, panel)
-    app = Application(
-        title="Operator panel",
-        summary="The HTTP interface of a robot cell's touch panel.",
-        lifespan=partial(_lifespan, settings, panel, repeated),
-        docs_url=None,  # these pages load scripts from other servers
-        redoc_url=None,
-        openapi_url=None,  # routes.description has it
-        max_body_size=LONGEST,
-        exception_handlers=HANDLERS,
-        dependencies=[Depends(method_guard), Depends(route_guard)],
-    )
-    _add_middleware(app, settings, panel.embed)
-    add_routes(app)
+    app = new_application(settings, panel.embed, partial(_lifespan, settings, panel, repeated))
     if settings.dev:
         _add_gallery(app)
     return app
@@ -107,22 +81,6 @@ def _add_gallery(app: FastAPI) -> None:
     app.state.path_methods.add(router.routes)
 
 
-def _add_middleware(app: FastAPI, settings: Settings, embed: EmbedRules) -> None:
-    """The last that is added sees a request first."""
-    if settings.dev:
-        app.add_exception_handler(Exception, on_error_in_development)
-    app.add_middleware(LateRoutes)
-    app.add_middleware(LanguageHeaders)
-    app.add_middleware(GZipMiddleware, minimum_size=500)
-    app.add_middleware(RequestGuard, hosts=settings.hosts, embed=embed)
-    app.add_middleware(BearerGuard)
-    app.add_middleware(Turns)
-    if settings.proxies:
-        app.add_middleware(Proxies, named=settings.proxies)
-    app.add_middleware(RootPath, root=settings.root_path)
-    app.add_middleware(ReadableStartupErrors)
-
-
 @asynccontextmanager
 async def _lifespan(
     settings: Settings, panel: Panel, repeated: RepeatedRecords, app: FastAPI
@@ -136,7 +94,7 @@ async def _lifespan(
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):
             once = (
                 _log_urls(app.state.server, ports, settings.hosts),
-                _prepare(app, state, panel),
+                load_pages(app, state, panel),
             )
             tasks = [
                 *(spawn_logged(work, log, "a task of the start failed") for work in once),
@@ -153,12 +111,6 @@ async def _lifespan(
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
                 watchdog.notify_stopping()
-
-
-async def _prepare(app: FastAPI, state: AppState, panel: Panel) -> None:
-    """What the pages use next, while the connection is set up."""
-    await pages.compiled(state.templates.environment(panel.language))
-    await load_used(app, panel)
 
 
 async def _end(state: AppState, watchdog: Watchdog, ports: set[int]) -> None:
@@ -184,24 +136,9 @@ async def _app_state(
     async with open_log(settings, panel) as oplog:
         check_port(server)
         _check_protected(settings, panel, server)
-        used = {widget.kind for widget in panel.widgets()} & KINDS.keys()  # the state has no row
-        kinds = {*KINDS} if settings.dev else used  # the gallery shows all
-        static_files, templates = shipped_path("static"), shipped_path("templates")
-        require_files(static_files, templates)
-        own = (panel.shown_pictures, panel.styles, panel.templates, panel.brand, panel.fonts)
-        assets = load_assets(
-            static_files,
-            templates,
-            panel.mm_per_px,
-            kinds,
-            *own,
-            has_alarms=panel.may_raise,
-        )
-        for page in panel.pages:
-            assets.sheet([widget.kind for widget in (*page.widgets, *panel.frame.widgets)])
-        revision = f"{panel.revision}-{assets.revision}"
-        if settings.dev:
-            revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
+        # The gallery shows all kinds.
+        assets = page_assets(panel, KINDS if settings.dev else ())
+        revision = page_revision(panel, assets, settings.dev)
         limits = PressLimits(partial(oplog.suppress, limited=True))
         doctor = _doctor(settings, server)
         async with (
@@ -211,7 +148,7 @@ async def _app_state(
             metrics = Metrics(
                 fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
             )
-            made = PageTemplates(templates, page_parts(panel), shipped_path(COMPILED))
+            made = PageTemplates(shipped_path("templates"), page_parts(panel), shipped_path(COMPILED))
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
             await access.reload()
             fleet.alarms.watch_sign_ins(access)

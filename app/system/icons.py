@@ -19,6 +19,7 @@ def icons() -> Mapping[str, str]:
     return dict(SYMBOL.findall(text))
 
 
+@cache
 def icon(name: str) -> Markup:
     """An icon as an element. It says nothing that the text beside it does not. KeyError for an unknown
     one."""

@@ -43,6 +43,7 @@ COMMON: Final = {
     "signin": ("forms", "pad"), "users": ("forms",), "recipes": ("forms",), "confirm": ("pad",),
 }  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
+EDITOR: Final = "editor"  # the folder of its scripts, style and templates, which no panel has
 LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
     ".css": re.compile(
@@ -218,7 +219,7 @@ def load_assets(
         parts = [*(static / "css" / f"{part}.css" for part in COMMON.get(name, ())), file]
         files[f"{name}.css"] = asset(b"".join(part.read_bytes() for part in parts), ".css")
     scripts = static / "js"
-    for script in sorted(scripts.rglob("*.js")):
+    for script in _of_panels(scripts, "*.js"):
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
     files |= {f"{PICTURES}/{name}": picture(file) for name, file in pictures.items()}
     fonts = sorted((static / FONTS).glob("*.woff2"))  # packed already
@@ -232,9 +233,14 @@ def load_assets(
     digest = hashlib.sha256()
     for name, sent in sorted(files.items()):
         digest.update(name.encode() + b"\0" + sent.source + b"\0")
-    for template in (*sorted(templates.rglob("*.html")), *own_templates):
+    for template in (*_of_panels(templates, "*.html"), *own_templates):
         digest.update(template.read_bytes() + b"\0")
     return Assets(files, digest.hexdigest()[:12], tuple(of_panel), sheet, tuple(styles))
+
+
+def _of_panels(folder: Path, pattern: str) -> list[Path]:
+    """The files below a folder, without those of the editor."""
+    return [file for file in sorted(folder.rglob(pattern)) if folder / EDITOR not in file.parents]
 
 
 def require_files(static: Path, templates: Path) -> None:

@@ -45,9 +45,11 @@ def place(path: Path) -> str:
 
 
 def paths_table() -> str:
-    """Each path of HTTP, with the function that answers."""
+    """Each path of HTTP of a panel's server, with the function that answers."""
     rows = [("Path", "Function", "File"), ("---",) * 3]
     for path, module_nodes in nodes().items():
+        if "tools" in path.parts:  # the editor's server is for its own page
+            continue
         texts = _constants(modules()[path])
         for node in module_nodes:
             if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef):

@@ -14,7 +14,8 @@ IMPORT: Final = re.compile(
     r'^(?:import|export)\b[^"();=]*"(\.{1,2}/[^"]+)"|\bimport\(\s*"([^"]+)"\)', re.MULTILINE
 )
 COMMENT: Final = re.compile(r"^\s*//.*$|/\*\*[^*]*\*/", re.MULTILINE)
-ENTRIES: Final = {"main", "guard", "print", "gallery"}  # named by a template, or in the page itself
+# Named by a template, or in the page itself.
+ENTRIES: Final = {"main", "guard", "print", "gallery", "editor/main"}
 
 
 def imports() -> Mapping[str, frozenset[str]]:

@@ -243,6 +243,42 @@ class RobotState:
         if (topic := self._topics.get(key)) is not None:
             topic.update(sample)
 
+    def copy_readings(self, other: "RobotState") -> None:
+        """Shows what another session with the same robot has received, without a link of its own: the
+        graph, the newest samples and what was made of them."""
+        self.graph, self.link_up = other.graph, other.link_up
+        self.settled_at, self.starting_until = other.settled_at, other.starting_until
+        self.is_responding, self.is_caught_up = other.is_responding, other.is_caught_up
+        self.is_queryable, self.nodes_are_read = other.is_queryable, other.nodes_are_read
+        self.clock, self.transforms, self.history = other.clock, other.transforms, other.history
+        self.option_lists, self.switched_to = other.option_lists, other.switched_to
+        self.silent_publishers, self.replayed = other.silent_publishers, other.replayed
+        self.topic_publishers, self.saved_places = other.topic_publishers, other.saved_places
+        states = other.parameters.items()
+        self.parameters |= {name: known for name, known in states if name in self.parameters}
+        self.maps |= {key: known for key, known in other.maps.items() if key in self.maps}
+        layers = other.map_layers.items()
+        self.map_layers |= {key: known for key, known in layers if key in self.map_layers}
+        self.log_lines |= {
+            key: lines for key, lines in other.log_lines.items() if key in self.log_lines
+        }
+        for key, topic in self._topics.items():
+            known_topic = other._topics.get(key)
+            if known_topic is not None and known_topic.sample is not None:
+                topic.update(known_topic.sample)
+        self.update_shared_topics()
+        self.presence.update(self.graph)
+
+    @property
+    def topic_keys(self) -> Collection[str]:
+        """The keys of the topics that the panel subscribes to."""
+        return self._topics.keys()
+
+    def received(self) -> Mapping[str, float]:
+        """When (monotonic seconds) the newest message of each topic came, by the topic's key."""
+        newest = ((key, topic.sample) for key, topic in self._topics.items())
+        return {key: sample.at for key, sample in newest if sample is not None}
+
     def mark_peer_lost(self, peer: str, seq: int) -> None:
         """A peer was lost at `seq`: its earlier samples are no longer valid. Without a bridge it is a
         process of the robot's, which has ended."""

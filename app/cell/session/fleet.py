@@ -16,6 +16,7 @@ from app.cell.alarms.shown import AlarmRow
 from app.cell.commands.diagnostic_acts import Doctor, NoDoctor
 from app.cell.commands.receipts import Receipt
 from app.cell.link.robot_access import ROBOT_ACCESS
+from app.cell.permission.conditions import fresh_since
 from app.cell.permission.interlocks import link_verdict, state_of
 from app.cell.permission.roles import ConfirmLocks
 from app.cell.robot.state import RobotState
@@ -38,6 +39,7 @@ from app.panel.model import Panel, RobotEntry
 from app.panel.robot_panels import widget_robots
 from app.records.press_record import Log
 from app.ros.zenoh.config import Config
+from app.ros.zenoh.session import ZenohSession
 from app.system.errors import InputError, NotFound
 from app.system.texts import TextLike, joined, say
 
@@ -120,6 +122,19 @@ def _place_file(panel: Panel) -> "SavedPlaceFile | None":
     return SavedPlaceFile()
 
 
+def _has_received(robot: RobotState, other: RobotState | None) -> bool:
+    own, wanted = robot.received(), other.received() if other else {}
+    aged = {robot.key(c.topic) for c in robot.conditions.values() if c.max_age_s is not None}
+    return all(
+        key in own and (key not in aged or own[key] >= fresh_since(robot, key))
+        for key in wanted.keys() & robot.topic_keys
+    )
+
+
+def _nothing() -> None:
+    """For a fleet that is only shown."""
+
+
 class Fleet:
     """Opened by `start`, closed by `stop`."""
 
@@ -134,6 +149,7 @@ class Fleet:
         simulated: bool = False,
         root_path: str = "",
         doctor: Doctor | None = None,
+        link: type[ZenohSession] = ZenohSession,
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
@@ -176,6 +192,7 @@ class Fleet:
             self.recipes,
             self.confirm_locks,
             self.place_file,
+            link,
         )
         for entry in panel.robots or (None,):
             access = ROBOT_ACCESS[(entry or panel).dialect]
@@ -272,6 +289,28 @@ class Fleet:
         if widget not in keys:
             raise InputError(f'robots: "{widget:.64}" is not a stop button of several robots')
         return [self.session(robot) for robot in dict.fromkeys(robots.split(","))]
+
+    def show_as(self, other: "Fleet | None") -> None:
+        """Shows what the sessions of another panel with the same robots have received, for good: this
+        fleet is never started."""
+        known = {session.robot.id: session for session in other.sessions} if other else {}
+        for session in self.sessions:
+            session.publisher.on_watched = _nothing
+            if (same := known.get(session.robot.id)) is not None:
+                session.robot.copy_readings(same.robot)
+                session.refresher.lamp = same.refresher.lamp
+        for session in self.sessions:
+            session.refresher.refresh_now()
+            session.refresher.stop()
+
+    def has_joined(self, other: "Fleet") -> bool:
+        """Whether commands reach all robots, and what another fleet has received has arrived here too,
+        new enough for what is judged by it."""
+        known = {session.robot.id: session.robot for session in other.sessions}
+        return all(
+            session.link_verdict.permitted and _has_received(session.robot, known.get(session.robot.id))
+            for session in self.sessions
+        )
 
     # The protocol `refresh.OtherRobots`, for each robot's session.
 

@@ -49,7 +49,7 @@ from app.panel.robot_panels import panel_of, widget_robots
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.trend import trends_of
 from app.records.press_record import Log, PressLog
-from app.ros.dialects.dialect import distribution_hashes
+from app.ros.dialects.dialect import Dialect, distribution_hashes
 from app.ros.messages import Interfaces, load_interfaces
 from app.ros.messages.names import ROSOUT_TOPIC
 from app.ros.zenoh.config import Config
@@ -294,7 +294,7 @@ ALONE: Final = NoOtherRobots()
 @dataclass(frozen=True, slots=True)
 class ServerParts:
     """The parts that all sessions share; `revision` is that of the page's files, `root_path` that below
-    which a proxy shows all pages."""
+    which a proxy shows all pages, `link` makes the session with a robot's peer."""
 
     panel: Panel
     revision: str
@@ -308,6 +308,7 @@ class ServerParts:
     recipes: Recipes | None = None
     confirm_locks: ConfirmLocks = UNKNOWN_USERS
     place_file: "SavedPlaceFile | None" = None
+    link: Callable[[Config, Callable[[bool], None], Dialect], ZenohSession] = ZenohSession
 
 
 def wire_session(
@@ -471,7 +472,7 @@ def _context(
     interfaces = load_interfaces(panel.distro, panel.interfaces)
     hashes = distribution_hashes(panel.distro, interfaces)
     dialect = access.dialect((entry or panel).domain, hashes)
-    link = ZenohSession(config, signals.arrived.emit, dialect)
+    link = server.link(config, signals.arrived.emit, dialect)
     robot = RobotState(
         panel,
         interfaces,

@@ -45,6 +45,7 @@ class Command:
 COMMANDS: Final[Mapping[str, Command]] = {
     "run": Command("serve a panel to browsers", "run"),
     "check": Command("check panel files: every fault with its place", "check"),
+    "edit": Command("edit a panel file in the browser", "edit"),
     "log": Command(
         "check the operator's log; print its key, or the panel that was shown at a time", "log"
     ),

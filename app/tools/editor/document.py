@@ -102,7 +102,15 @@ class ReplaceText:
     text: str
 
 
-Edit = SetValue | Delete | Insert | Move | Duplicate | Rename | ReplaceText
+@dataclass(frozen=True, slots=True)
+class Paste:
+    """A table by its text, which is another one than that with the same ids in the file."""
+
+    path: Path
+    text: str
+
+
+Edit = SetValue | Delete | Insert | Move | Duplicate | Rename | ReplaceText | Paste
 
 OPERATIONS: Final[Mapping[str, tuple[type[Edit], tuple[str, ...]]]] = {
     "set": (SetValue, ("path", "value")),
@@ -112,6 +120,7 @@ OPERATIONS: Final[Mapping[str, tuple[type[Edit], tuple[str, ...]]]] = {
     "duplicate": (Duplicate, ("path", "to")),
     "rename": (Rename, ("path", "id")),
     "text": (ReplaceText, ("path", "text")),
+    "paste": (Paste, ("path", "text")),
 }
 
 
@@ -422,6 +431,9 @@ class Draft:
                 case Duplicate(path, to):
                     self.duplicate(path, to)
                     return to
+                case Paste(path, text):
+                    self.paste(path, text)
+                    return path
                 case Rename(path, name):
                     self.rename(path, name)
                     return path
@@ -721,6 +733,12 @@ class Draft:
         else:
             self.insert(to, value)
         self.with_new_ids(to, taken)
+
+    def paste(self, path: Path, text: str) -> None:
+        taken = taken_ids(self.tables)
+        self.insert(path, {})
+        self.replace_text(path, text)
+        self.with_new_ids(path, taken)
 
     def with_new_ids(self, path: Path, taken: Mapping[Group, set[str]]) -> None:
         """Gives what has an id in a copied table another one where `taken` has it, and renames the

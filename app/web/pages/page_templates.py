@@ -55,6 +55,10 @@ class PageTemplates:
         self._failing: set[str] = set()  # ids of widgets whose failure was logged
         self._own = own or {}
 
+    def use(self, own: "Mapping[str, PageParts]") -> None:
+        """Uses what the pages' own templates of another panel make."""
+        self._own = own
+
     def environment(self, language: str) -> Environment:
         """The environment of a language that has a catalogue."""
         if language not in self._environments:

@@ -12,6 +12,7 @@ from app.panel.widgets.families import EntryWidget
 from app.system.errors import NotFound
 from app.system.texts import say
 from app.web.app_state import AppState, CurrentState
+from app.web.assets import EDITOR
 from app.web.caller import QUERY, caller_of, frame_ancestors, only_shows, says_embedded
 from app.web.pages.compiled_templates import template_names
 from app.web.pages.context import page_context
@@ -87,7 +88,8 @@ async def named_page(page: str, request: Request, state: CurrentState) -> Respon
 
 def is_of_a_page(name: str) -> bool:
     """Whether a file of the templates' folder is a template of a panel's pages."""
-    return name.endswith(".html") and name not in OTHER_PAGES
+    is_editors = name.startswith(f"{EDITOR}/")
+    return name.endswith(".html") and name not in OTHER_PAGES and not is_editors
 
 
 async def compiled(templates: Environment) -> None:

@@ -1,0 +1,127 @@
+"""`operator-panel edit PANEL`: the editor of a panel file, in the browser.
+
+Exit status: 0 it was ended, 1 it can't be started, 2 a mistake on the command line.
+"""
+
+import secrets
+import socket
+import sys
+from argparse import ArgumentTypeError, Namespace
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from importlib.util import find_spec
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Final
+
+from app.system.errors import KioskError, SettingsError
+from app.system.settings import Settings, panel_path
+from app.tools.cli.arguments import port_to_listen
+from app.tools.cli.parser import Parser
+
+PROG: Final = "python -m app.cli edit"
+NEEDED: Final = "tomlrt"
+NOT_INSTALLED: Final = (
+    'the editor needs the extra "edit": pip install "operator-panel[edit]", or pip install tomlrt'
+)
+LANGUAGES: Final = ("en", "ja", "de")
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    parser = make_parser(prog)
+    options = parser.parse_args(arguments)
+    if (options.ssl_certfile is None) != (options.ssl_keyfile is None):
+        parser.error("--ssl-certfile and --ssl-keyfile are given together")
+    if find_spec(NEEDED) is None:
+        print(NOT_INSTALLED, file=sys.stderr)
+        return 1
+    try:
+        _check(options.panel, options.host, options.ssl_certfile is not None)
+        settings = Settings.from_environment()
+        return _serve(options, settings)
+    except (KioskError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def _check(path: Path, host: str, has_tls: bool) -> None:
+    """SettingsError if the file can't be edited, or its editor would be open to the network."""
+    if not path.is_file():
+        raise SettingsError(f"{path}: there is no such file")
+    if _is_loopback(host) or has_tls:
+        return
+    raise SettingsError(
+        f"to listen on {host}, beyond this machine, the editor needs TLS (--ssl-certfile and"
+        " --ssl-keyfile): its address has a secret. Listen on 127.0.0.1, and reach it by ssh -L"
+    )
+
+
+def _is_loopback(host: str) -> bool:
+    infos = socket.getaddrinfo(host or None, None, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    return all(ip_address(str(info[4][0]).partition("%")[0]).is_loopback for info in infos)
+
+
+def _serve(options: Namespace, settings: Settings) -> int:
+    """Serves until it is ended. Imported here: the help needs no server."""
+    import uvicorn
+
+    from app.tools.editor.server import editor_app
+    from app.web.server import OPTIONS
+
+    family = socket.AF_INET6 if ":" in options.host else socket.AF_INET
+    listening = socket.create_server((options.host, options.port), family=family)
+    port, token = listening.getsockname()[1], secrets.token_urlsafe(24)
+    name = f"[{options.host}]" if ":" in options.host else options.host
+    if not _is_loopback(options.host):
+        settings = replace(settings, hosts=(*settings.hosts, name.lower()))
+    app = editor_app(
+        options.panel,
+        settings,
+        token=token,
+        port=port,
+        is_live=options.live,
+        language=options.language or "",
+    )
+    scheme = "https" if options.ssl_certfile else "http"
+    print(f"{scheme}://{name}:{port}/?token={token}", flush=True)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            app,
+            ssl_certfile=options.ssl_certfile,
+            ssl_keyfile=options.ssl_keyfile,
+            log_level="warning",
+            timeout_graceful_shutdown=1,
+            **OPTIONS,
+        )
+    )
+    with suppress(KeyboardInterrupt):  # uvicorn has ended by then
+        server.run(sockets=[listening])
+    return 0
+
+
+def make_parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog,
+        description="Edits a panel file in the browser: prints the address to open. The file stays as"
+        " it was written, with its comments.",
+    )
+    add = parser.add_argument
+    add("panel", metavar="PANEL", type=_panel, help="the panel file")
+    add("--host", default="127.0.0.1", help="address to listen on; default: %(default)s")
+    add("--port", default=8100, type=port_to_listen, help="default: %(default)s; 0: one that is free")
+    add(
+        "--live",
+        action="store_true",
+        help="show the real robot's values (KIOSK_ZENOH), which is only read; default: a simulated one",
+    )
+    add("--language", choices=LANGUAGES, help="of the editor; default: the browser's")
+    add("--ssl-certfile", type=Path, metavar="FILE", help="for HTTPS: the certificate")
+    add("--ssl-keyfile", type=Path, metavar="FILE", help="for HTTPS: its key")
+    return parser
+
+
+def _panel(name: str) -> Path:
+    if not name:
+        raise ArgumentTypeError("the name of a panel file is missing")
+    return panel_path(name).resolve()

@@ -1,0 +1,267 @@
+"""The editor's page and its panes: what their templates are rendered with."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from app.panel.file.toml_lines import Path
+from app.system.errors import NotFound, Remark
+from app.system.texts import TextLike, render, say
+from app.system.texts.locales import own_name
+from app.tools.editor.document import DiffLine
+from app.tools.editor.editor import Editor, Part, PartRequest
+from app.tools.editor.outline import outline
+from app.tools.editor.paths import at, kind_of, path_at, table_at, tag_of, title_of, widget_paths
+from app.tools.editor.places import page_of, places_on
+
+SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
+THEMES: Final = (
+    ("light", "sun", "display_theme_light"),
+    ("dark", "moon", "display_theme_dark"),
+    ("contrast", "contrast", "display_theme_contrast"),
+)
+LEFT: Final = ("robot", "outline", "parts")
+LEFT_WORDS: Final = {
+    "robot": "editor_tab_robot",
+    "outline": "editor_tab_outline",
+    "parts": "editor_tab_parts",
+}
+# Tables that the right pane offers for what is around the selection, with the words of their tabs.
+TABS: Final = {"widget": "editor_tab_widget", "group": "editor_tab_group", "page": "editor_tab_page"}
+
+# The words of the page itself.
+WORDS: Final = {
+    "close": say("editor_close"),
+    "undo": say("editor_undo"),
+    "redo": say("editor_redo"),
+    "arrange": say("editor_arrange"),
+    "try": say("editor_try"),
+    "save": say("editor_save"),
+    "sizes": say("editor_sizes"),
+    "languages": say("editor_languages"),
+    "theme": say("editor_theme"),
+    "mode": say("editor_mode"),
+    "preview": say("editor_preview"),
+    "preview_keys": say("editor_preview_keys"),
+    "file_pane": say("editor_file_pane"),
+    "table_pane": say("editor_table_pane"),
+    "faults": say("editor_faults"),
+    "diff": say("editor_diff"),
+    "pages_of_panel": say("editor_pages_of_panel"),
+    "behind": say("editor_behind"),
+    "lost": say("editor_lost"),
+}
+
+
+class PageTab(NamedTuple):
+    id: str
+    title: str
+    icon: str
+
+
+class Tab(NamedTuple):
+    """`path` is that of the table which it shows."""
+
+    title: TextLike
+    path: Path
+    is_chosen: bool
+
+
+def page_context(editor: Editor, language: str, revision: str) -> dict[str, Any]:
+    """The variables of `edit.html`."""
+    tables, panel = editor.document.tables, editor.preview.panel
+    named = [tables.get("language", "en"), *_strings(tables.get("languages"))]
+    languages = [*dict.fromkeys(name for name in named if isinstance(name, str))]
+    if panel is not None:
+        languages = [*panel.readers_languages]
+    return {
+        "revision": revision,
+        "file": editor.file.path.name,
+        "sizes": SIZES,
+        "languages": [(tag, own_name(tag)) for tag in languages],
+        "shown_language": panel.language if panel is not None else languages[0],
+        "themes": [(name, icon, say(word)) for name, icon, word in THEMES],
+        "shown_theme": panel.theme if panel is not None else "light",
+        "left": [(name, say(LEFT_WORDS[name])) for name in LEFT],
+        "words": WORDS,
+    }
+
+
+def _strings(value: Any) -> list[str]:
+    return [entry for entry in value if isinstance(entry, str)] if isinstance(value, list) else []
+
+
+def _pages(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    """The keys of the panel's pages, below the preview."""
+    panel = request.editor.preview.panel
+    shown = request.query.get("language", "") or (panel.language if panel else "")
+    pages = [
+        PageTab(page.id, render(page.title, shown), page.icon or "")
+        for page in (panel.pages if panel else ())
+    ]
+    return "_pages.html", {"pages": pages, "add": say("editor_add_page")}
+
+
+def place_list(editor: Editor, page_id: str) -> dict[str, Any]:
+    """The parts of a page that can be selected, and the faulty ones."""
+    panel, document = editor.preview.panel, editor.document
+    if panel is None:
+        return {"page": "", "places": [], "faulty": []}
+    page = panel.page(page_id) or panel.pages[0]
+    if page_id and page.id != page_id:
+        raise NotFound(f'there is no page "{page_id:.64}"')
+    places = [place.as_json() for place in places_on(page, panel, document.tables)]
+    faulty = [
+        {"path": table_at(document.tables, path_at(fault.place)), "message": fault.message}
+        for fault in editor.checked.faults
+    ]
+    return {"page": page.id, "places": places, "faulty": faulty}
+
+
+def _outline(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    tables = request.editor.document.tables
+    return "_outline.html", {
+        "nodes": [*outline(tables, request.language)],
+        "path": request.path,
+        "search": say("editor_search_outline"),
+        "label": say("editor_tab_outline"),
+    }
+
+
+class FaultRow(NamedTuple):
+    """`path` is the table that it selects. `about` names it, as `check` does."""
+
+    is_fault: bool
+    about: str
+    message: str
+    line: int
+    path: Path
+    page: str
+
+
+def _faults(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    checked, tables = request.editor.checked, request.editor.document.tables
+    rows = [
+        *(_fault_row(fault, True, tables) for fault in checked.faults),
+        *(_fault_row(note, False, tables) for note in checked.notes),
+    ]
+    faults, notes = len(checked.faults), len(checked.notes)
+    return "_faults.html", {
+        "rows": rows,
+        "faults": _counted("editor_fault_one", "editor_fault_many", faults),
+        "notes": _counted("editor_note_one", "editor_note_many", notes),
+        "good": say("editor_no_faults"),
+        "says": say("editor_as_check"),
+        "line": lambda number: say("editor_line", number=number),
+    }
+
+
+def _counted(singular: str, plural: str, number: int) -> TextLike:
+    return say(singular if number == 1 else plural, number=number) if number else ""
+
+
+def _fault_row(remark: Remark, is_fault: bool, tables: Mapping[str, Any]) -> FaultRow:
+    path = path_at(remark.place)
+    table = table_at(tables, path)
+    key = path[len(table)] if len(path) > len(table) else ""
+    name = remark.id or title_of(at(tables, table)) or (kind_of(tables, table) if table else "")
+    about = ": ".join(filter(None, (name, str(key))))
+    return FaultRow(is_fault, about, remark.message, remark.line, table, page_of(table, tables))
+
+
+def _diff(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    document = request.editor.document
+    total = document.text.count("\n")
+    lines = _with_gaps(document.diff(request.editor.file.text), total)
+    new = sum(1 for kind, _, _ in lines if kind in ("added", "removed"))
+    return "_diff.html", {
+        "lines": lines if new else (),
+        "title": say("editor_diff"),
+        "nothing": say("editor_nothing_to_save"),
+        "count": say("editor_diff_count", changed=new, lines=total) if new else "",
+    }
+
+
+def _with_gaps(lines: Sequence[DiffLine], total: int) -> list[tuple[str, int, TextLike]]:
+    """(kind, number, text) of the lines; a gap says how many lines it stands for."""
+    shown: list[tuple[str, int, TextLike]] = []
+    newest = 0  # line of the new text
+    for at_line, line in enumerate(lines):
+        if line.kind == "gap":
+            following = (after.number - 1 for after in lines[at_line + 1 :])
+            skipped = next(following, total) - newest
+            shown.append(("gap", 0, _counted("editor_gap_one", "editor_gap_many", skipped)))
+            continue
+        shown.append((line.kind, line.number, line.text))
+        if line.kind != "removed":
+            newest = line.number
+    return shown
+
+
+def _form(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    """The selected table as text, until it has a form."""
+    document = request.editor.document
+    path = request.path
+    if path and at(document.tables, path) is None:
+        path = ()
+    first, last = document.lines(path)
+    return "_form.html", {
+        "tabs": _tabs(document.tables, path),
+        "path": path,
+        "title": title_of(at(document.tables, path)) if path else request.editor.file.path.name,
+        "kind": kind_of(document.tables, path),
+        "lines": say("editor_lines", first=first, last=last),
+        "text": document.text_of(path),
+        "words": {"apply": say("editor_apply"), "text": say("editor_text_of_table")},
+    }
+
+
+def _tabs(tables: Mapping[str, Any], path: Path) -> Sequence[Tab]:
+    """The selected table and those around it, the innermost first."""
+    tabs = []
+    for end in range(len(path), 0, -1):
+        if isinstance(at(tables, path[:end]), Mapping):
+            step = next(step for step in reversed(path[:end]) if isinstance(step, str))
+            word = TABS.get(step)
+            tabs.append(Tab(say(word) if word else step, path[:end], end == len(path)))
+    return [*tabs, Tab(say("editor_tab_panel"), (), not path)]
+
+
+def _delete(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    """The question before a table is deleted that others name; nothing if none does."""
+    document, path = request.editor.document, request.path
+    inside = [
+        path,
+        *(owner for owner, _ in widget_paths(document.tables) if owner[: len(path)] == path),
+    ]
+    naming = {
+        table_at(document.tables, reference): None
+        for owner in inside
+        for reference in document.references(owner)
+        if reference[: len(path)] != path
+    }
+    tag = tag_of(document.tables, path)
+    return "_delete.html", {
+        "title": say("editor_delete_named", name=tag, number=len(naming)),
+        "names": [tag_of(document.tables, table) for table in naming],
+        "words": {"keep": say("editor_keep"), "delete": say("editor_delete")},
+    }
+
+
+def _robot(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    return "_later.html", {"text": say("editor_robot_later")}
+
+
+def _kinds(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    return "_later.html", {"text": say("editor_parts_later")}
+
+
+PARTS: Final[Mapping[str, Part]] = {
+    "pages": _pages,
+    "outline": _outline,
+    "faults": _faults,
+    "diff": _diff,
+    "form": _form,
+    "delete": _delete,
+    "robot": _robot,
+    "parts": _kinds,
+}

@@ -1,0 +1,109 @@
+// Starts the editor's page: its header, its keys and its panes.
+import * as arrange from "./arrange.js";
+import * as change from "./change.js";
+import * as outline from "./outline.js";
+import * as panes from "./panes.js";
+import * as preview from "./preview.js";
+import { select } from "./selection.js";
+import { edit, onMessage, onState, open, step } from "./wire.js";
+
+/** @param {string} id */
+const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+/** @param {string} attribute @param {string} value */
+function press(attribute, value) {
+  for (const button of document.querySelectorAll(`[data-${attribute}]`))
+    button.setAttribute("aria-pressed", String(button.getAttribute(`data-${attribute}`) === value));
+}
+
+/** @type {Record<string, (value: string) => void>} */
+const CHOICES = {
+  size: (value) => {
+    const [width, height] = value.split("x").map(Number);
+    preview.setSize(width, height);
+  },
+  language: (value) => {
+    preview.setChoice("language", value);
+    panes.fill(get("pages"), "pages", { language: value });
+  },
+  "theme-of": (value) => preview.setChoice("theme", value),
+  mode: (value) => document.body.classList.toggle("trying", value === "try"),
+};
+
+for (const [name, choose] of Object.entries(CHOICES)) {
+  for (const button of document.querySelectorAll(`[data-${name}]`)) {
+    button.addEventListener("click", () => {
+      const value = button.getAttribute(`data-${name}`) ?? "";
+      press(name, value);
+      choose(value);
+    });
+  }
+}
+
+/** @param {"undo" | "redo" | "save"} name */
+async function take(name) {
+  const answer = await step(name);
+  if (answer?.select) select(answer.select, "edit");
+}
+for (const name of /** @type {const} */ (["undo", "redo", "save"]))
+  get(name).addEventListener("click", () => take(name));
+
+document.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+  const key = event.key.toLowerCase();
+  const inText = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement;
+  if (key === "s") take("save");
+  else if (inText) return;
+  else if (key === "z") take(event.shiftKey ? "redo" : "undo");
+  else if (key === "y") take("redo");
+  else return;
+  event.preventDefault();
+});
+
+onState((now, before) => {
+  get("status").textContent = now.status;
+  get("undo").toggleAttribute("disabled", !now.undo);
+  get("redo").toggleAttribute("disabled", !now.redo);
+  if (now.drawn !== before.drawn) panes.fill(get("pages"), "pages", shownLanguage());
+});
+
+/** @returns {Record<string, string>} */
+function shownLanguage() {
+  const chosen = document.querySelector('[data-language][aria-pressed="true"]');
+  return chosen ? { language: chosen.getAttribute("data-language") ?? "" } : {};
+}
+
+onMessage((text) => {
+  get("message").textContent = text;
+  get("message").hidden = !text;
+});
+
+get("pages").addEventListener("click", (event) => {
+  const key = event.target instanceof Element ? event.target.closest("[data-page]") : null;
+  if (key?.dataset.page) preview.showPage(key.dataset.page);
+});
+
+function markPage() {
+  for (const key of get("pages").querySelectorAll("[data-page]")) {
+    if (key.dataset.page === preview.shownPage()) key.setAttribute("aria-current", "page");
+    else key.removeAttribute("aria-current");
+  }
+}
+preview.onDrawn(markPage);
+panes.onPane((pane) => pane === get("pages") && markPage());
+
+// A table as text is one edit when it is sent.
+get("form").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const form = event.target;
+  if (!(form instanceof HTMLFormElement) || !form.dataset.textOf) return;
+  const text = String(new FormData(form).get("text") ?? "");
+  await edit([{ op: "text", path: JSON.parse(form.dataset.textOf), text }]);
+});
+
+panes.start();
+outline.start();
+preview.start();
+arrange.start();
+change.start();
+open();

@@ -1,0 +1,130 @@
+// The panes beside and below the preview: fragments of the server, put into the page as they come.
+import { isSame, onSelect, select, selection } from "./selection.js";
+import { onDrawn } from "./preview.js";
+import { onState, part, state } from "./wire.js";
+
+/** @typedef {import("./wire.js").Path} Path */
+
+const left = /** @type {HTMLElement} */ (document.getElementById("left"));
+const form = /** @type {HTMLElement} */ (document.getElementById("form"));
+const faults = /** @type {HTMLElement} */ (document.getElementById("faults"));
+const diff = /** @type {HTMLElement} */ (document.getElementById("diff"));
+
+// The page itself is drawn first after an edit; without it the panes wait no longer than this.
+const AFTER_MS = 300;
+let isOutdated = false;
+let timer = 0;
+
+async function fillAll() {
+  if (!isOutdated) return;
+  isOutdated = false;
+  clearTimeout(timer);
+  await Promise.all([fill(form, "form"), fill(faults, "faults"), fill(diff, "diff")]);
+  await fill(left, left.dataset.part ?? "outline");
+}
+
+/** @type {Map<HTMLElement, number>} */
+const asked = new Map();
+/** @type {((pane: HTMLElement) => void)[]} */
+const listeners = [];
+
+// Called when a pane has another content.
+/** @param {(pane: HTMLElement) => void} listener */
+export function onPane(listener) {
+  listeners.push(listener);
+}
+
+/** @param {HTMLElement} pane @param {string} name @param {Record<string, string>} [query] */
+export async function fill(pane, name, query = {}) {
+  const turn = (asked.get(pane) ?? 0) + 1;
+  asked.set(pane, turn);
+  const html = await part(name, { path: JSON.stringify(selection() ?? []), ...query });
+  if (html === null || asked.get(pane) !== turn) return;
+  const kept = keepPlace(pane);
+  pane.innerHTML = html;
+  kept();
+  for (const listener of listeners) listener(pane);
+}
+
+// The focus and what is scrolled are as they were, where the same element is there again.
+/** @param {HTMLElement} pane @returns {() => void} */
+function keepPlace(pane) {
+  const active = pane.contains(document.activeElement) ? document.activeElement : null;
+  const named = active && nameOf(active);
+  const scrolled = pane.querySelector(".scroll, .fault-list, pre, .form")?.scrollTop ?? 0;
+  return () => {
+    const area = pane.querySelector(".scroll, .fault-list, pre, .form");
+    if (area) area.scrollTop = scrolled;
+    if (!named) return;
+    const same = [...pane.querySelectorAll(named.tag)].find((element) => nameOf(element).name === named.name);
+    if (same instanceof HTMLElement) same.focus({ preventScroll: true });
+  };
+}
+
+/** @param {Element} element */
+function nameOf(element) {
+  const data = element instanceof HTMLElement ? element.dataset : {};
+  return {
+    tag: element.localName,
+    name: element.id || element.getAttribute("name") || data.path || data.select || data.tab || "",
+  };
+}
+
+/** @param {string} name */
+export function showTab(name) {
+  for (const tab of document.querySelectorAll("[data-tab]")) {
+    const isChosen = tab instanceof HTMLElement && tab.dataset.tab === name;
+    tab.setAttribute("aria-selected", String(isChosen));
+    if (tab instanceof HTMLElement) tab.tabIndex = isChosen ? 0 : -1;
+  }
+  left.dataset.part = name;
+  left.setAttribute("aria-labelledby", `tab-${name}`);
+  fill(left, name);
+}
+
+/** @param {KeyboardEvent} event */
+function onTabKey(event) {
+  const tabs = [...document.querySelectorAll(".left [data-tab]")];
+  const number = tabs.indexOf(/** @type {HTMLElement} */ (event.target));
+  const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+  if (number < 0 || !step) return;
+  event.preventDefault();
+  const next = tabs[(number + step + tabs.length) % tabs.length];
+  next.focus();
+  next.click();
+}
+
+/** @param {Event} event */
+function onClick(event) {
+  const target = event.target instanceof Element ? event.target : null;
+  const tab = target?.closest("[data-tab]");
+  if (tab?.dataset.tab) showTab(tab.dataset.tab);
+  const chosen = target?.closest("[data-select]");
+  if (chosen?.dataset.select) select(JSON.parse(chosen.dataset.select), "list");
+}
+
+export function start() {
+  document.addEventListener("click", onClick);
+  document.querySelector(".left .tabs")?.addEventListener("keydown", (event) => {
+    if (event instanceof KeyboardEvent) onTabKey(event);
+  });
+  onState((now, before) => {
+    if (now.revision === before.revision && now.drawn === before.drawn && now.saved === before.saved) return;
+    isOutdated = true;
+    clearTimeout(timer);
+    timer = setTimeout(fillAll, now.drawn === before.drawn ? 0 : AFTER_MS);
+  });
+  onDrawn(fillAll);
+  onSelect(() => fill(form, "form"));
+  onPane((pane) => pane === faults && markFault());
+  onSelect(markFault);
+  if (state.revision) showTab(left.dataset.part ?? "outline");
+}
+
+function markFault() {
+  for (const fault of faults.querySelectorAll("[data-select]")) {
+    const isHere = isSame(JSON.parse(fault.dataset.select ?? "null"), selection());
+    fault.toggleAttribute("aria-current", isHere);
+    if (isHere) fault.setAttribute("aria-current", "true");
+  }
+}

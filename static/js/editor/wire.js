@@ -1,0 +1,135 @@
+// The editor's server: its state by one event stream, edits one after the other, and the panes as fragments.
+
+/** @typedef {(string | number)[]} Path */
+/** @typedef {{ number: number, path: Path, tag: string }} OtherBrowser */
+/**
+ * @typedef {object} State
+ * @property {number} revision
+ * @property {number} drawn The number of the panel that pages are drawn from.
+ * @property {number} live The number of the panel whose sessions run.
+ * @property {boolean} saved
+ * @property {string} status
+ * @property {boolean} undo
+ * @property {boolean} redo
+ * @property {number} faults
+ * @property {OtherBrowser[]} others
+ */
+/** @typedef {{ op: string, path: Path, value?: unknown, to?: Path, id?: string, text?: string }} Edit */
+/** @typedef {{ revision: number, drawn: number, select?: Path | null, message?: string, path?: Path }} Answer */
+
+const REOPEN_MS = 1000;
+const JSON_BODY = { "content-type": "application/json" };
+
+export const browser = crypto.randomUUID();
+
+/** @type {State} */
+export let state = {
+  revision: 0,
+  drawn: 0,
+  live: 0,
+  saved: true,
+  status: "",
+  undo: false,
+  redo: false,
+  faults: 0,
+  others: [],
+};
+
+/** @type {((now: State, before: State) => void)[]} */
+const listeners = [];
+/** @type {((text: string) => void)[]} */
+const readers = [];
+
+// Called after each change of the state.
+/** @param {(now: State, before: State) => void} listener */
+export function onState(listener) {
+  listeners.push(listener);
+}
+
+// Called with each sentence for the person who edits; "" when it is over.
+/** @param {(text: string) => void} reader */
+export function onMessage(reader) {
+  readers.push(reader);
+}
+
+/** @param {string} text */
+export function say(text) {
+  for (const reader of readers) reader(text);
+}
+
+/** @param {Partial<State>} news */
+function update(news) {
+  const before = state;
+  state = { ...state, ...news };
+  for (const listener of listeners) listener(state, before);
+}
+
+export function open() {
+  const stream = new EventSource(`/events?browser=${browser}`);
+  stream.addEventListener("state", (event) => {
+    say("");
+    update(JSON.parse(/** @type {MessageEvent} */ (event).data));
+  });
+  stream.onerror = () => {
+    say(document.body.dataset.lost ?? "");
+    if (stream.readyState === EventSource.CLOSED) setTimeout(open, REOPEN_MS);
+  };
+}
+
+// Edits are posted one after the other, each on what the one before made.
+/** @type {Promise<unknown>} */
+let last = Promise.resolve();
+
+/** @template T @param {() => Promise<T>} task @returns {Promise<T>} */
+function inTurn(task) {
+  const done = last.then(task, task);
+  last = done.catch(() => {});
+  return done;
+}
+
+/** @param {string} path @param {unknown} [body] @returns {Promise<Answer | null>} */
+async function post(path, body = {}) {
+  let response;
+  try {
+    response = await fetch(path, { method: "POST", headers: JSON_BODY, body: JSON.stringify(body) });
+  } catch {
+    say(document.body.dataset.lost ?? "");
+    return null;
+  }
+  const answer = response.status === 204 ? {} : await response.json();
+  if ("revision" in answer) update(answer);
+  if (response.ok) {
+    say("");
+    return answer;
+  }
+  say(answer.message ?? answer.error ?? "");
+  return null;
+}
+
+// Changes the document, as one step that can be undone; the server's answer, null if it was refused.
+/** @param {Edit[]} edits @param {string} [label] */
+export function edit(edits, label = "") {
+  return inTurn(() => post("/edits", { revision: state.revision, edits, label }));
+}
+
+// Pastes a table by its text, after the table at `path` or at its end.
+/** @param {Path} path @param {string} text */
+export function pasteText(path, text) {
+  return inTurn(() => post("/paste", { path, text }));
+}
+
+/** @param {"undo" | "redo" | "save"} name */
+export function step(name) {
+  return inTurn(() => post(`/${name}`));
+}
+
+/** @param {Path | null} path */
+export function tellSelection(path) {
+  fetch("/selection", { method: "POST", headers: JSON_BODY, body: JSON.stringify({ browser, path }) }).catch(() => {});
+}
+
+/** @param {string} name @param {Record<string, string>} query */
+export async function part(name, query) {
+  const response = await fetch(`/parts/${name}?${new URLSearchParams(query)}`);
+  return response.ok ? response.text() : null;
+}

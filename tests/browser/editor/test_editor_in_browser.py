@@ -1,0 +1,295 @@
+"""The editor with a mouse and a keyboard: what is selected, moved, typed and saved."""
+
+import json
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Browser, FloatRect, FrameLocator, Page, expect
+
+from tests.browser.test_accessibility import ALL, AXE, RUN
+from tests.support.browser.browsers import ReusedPage
+from tests.support.editor import PANEL, EditorServer, editing
+from tests.support.parts import until
+
+SPEED: Final = ["page", 0, "group", 0, "widget", 0]
+READY: Final = ["page", 0, "group", 0, "widget", 1]
+OPEN: Final = ["page", 0, "group", 1, "widget", 0]
+CHOSEN: Final = ".tr[aria-selected='true']"
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:
+    with editing(tmp_path_factory.mktemp("editor")) as mine:
+        yield mine
+
+
+@pytest.fixture(scope="module")
+def reused_page(chromium: Browser) -> Iterator[ReusedPage]:
+    """Axe may be added to its pages."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    yield mine
+    mine.close()
+
+
+@pytest.fixture
+def editor(running: EditorServer) -> EditorServer:
+    running.edit({"op": "text", "path": [], "text": PANEL}).raise_for_status()
+    running.http.post("/save", json={}).raise_for_status()
+    return running
+
+
+@pytest.fixture
+def desk(page: Page, editor: EditorServer) -> Page:
+    """The editor's page on a desk screen, with the preview there."""
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.goto(editor.address)
+    expect(preview(page).locator("#at-speed")).to_be_visible()
+    expect(page.locator(".tr").first).to_be_visible()
+    expect(page.locator("#frames")).to_have_attribute("data-live", str(editor.state()["drawn"]))
+    return page
+
+
+def preview(page: Page) -> FrameLocator:
+    return page.frame_locator("#frames iframe:not(.coming)")
+
+
+def box_of(page: Page, selector: str) -> FloatRect:
+    """Where an element of the preview is on the screen, in px."""
+    box = preview(page).locator(selector).bounding_box()
+    assert box is not None
+    return box
+
+
+def middle(box: FloatRect) -> tuple[float, float]:
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def chosen(page: Page) -> Any:
+    """The path that the outline shows as selected; None for none."""
+    line = page.locator(CHOSEN)
+    return json.loads(line.get_attribute("data-path") or "null") if line.count() else None
+
+
+def select(page: Page, selector: str, path: Any) -> None:
+    page.mouse.click(*middle(box_of(page, selector)))
+    until(lambda: chosen(page) == path, f"{selector} is selected")
+
+
+def order(editor: EditorServer) -> list[str]:
+    """The ids of the widgets, in the order of the file."""
+    text = editor.http.get("/text").text
+    return [line.split('"')[1] for line in text.splitlines() if line.startswith("id = ")]
+
+
+@pytest.mark.parametrize(
+    ("selector", "path", "tag"),
+    [
+        ("#at-speed", SPEED, "readout: speed"),
+        ('.group[data-group="1"] h2', ["page", 0, "group", 1], "group: Gripper"),
+        ("#at-open", OPEN, "call: open"),
+    ],
+)
+def test_a_click_selects_the_table_of_what_is_there(
+    desk: Page, selector: str, path: Any, tag: str
+) -> None:
+    select(desk, selector, path)
+    expect(desk.locator(".ring.chosen .tag")).to_have_text(tag)
+    shown = box_of(desk, selector)
+
+    def surrounds() -> bool:
+        ring = desk.locator(".ring.chosen").bounding_box()
+        return ring is not None and ring["x"] <= shown["x"] + 1 and ring["y"] <= shown["y"] + 1
+
+    until(surrounds, "the ring is around it")
+
+
+def test_the_keyboard_alone_selects_and_opens_the_form(desk: Page) -> None:
+    overlay = desk.locator("#overlay")
+    overlay.focus()
+    desk.keyboard.press("End")
+    until(lambda: chosen(desk) is not None, "the last is selected")
+    desk.keyboard.press("Home")
+    desk.keyboard.press("ArrowRight")
+    seen = []
+    for _ in range(8):
+        seen.append(chosen(desk))
+        desk.keyboard.press("ArrowRight")
+    assert SPEED in seen
+    assert ["page", 0, "group", 1] in seen
+    select(desk, "#at-speed", SPEED)
+    desk.keyboard.press("Escape")
+    until(lambda: chosen(desk) == SPEED[:-2], "the group around it is selected")
+    desk.keyboard.press("Enter")
+    assert desk.evaluate("document.activeElement.closest('#form') !== null")
+
+
+def test_an_edit_is_drawn_and_follows_with_its_sessions(desk: Page, editor: EditorServer) -> None:
+    editor.edit({"op": "set", "path": [*SPEED, "label"], "value": "Belt speed"}).raise_for_status()
+    expect(preview(desk).locator("#at-speed")).to_contain_text("Belt speed")
+    expect(desk.locator("#status")).to_have_text("1 change, not saved")
+    expect(desk.locator("#diff .added")).to_contain_text('label = "Belt speed"      # shown large')
+    drawn = editor.state()["drawn"]
+    until(lambda: editor.state()["live"] == drawn, "its sessions run")
+    expect(preview(desk).locator("#at-speed")).to_contain_text("Belt speed")
+    expect(preview(desk).locator("#state")).not_to_have_attribute("data-state", "lost")
+
+
+def test_undo_redo_and_save_by_keys(desk: Page, editor: EditorServer) -> None:
+    editor.edit({"op": "set", "path": [*SPEED, "label"], "value": "Belt speed"}).raise_for_status()
+    expect(desk.locator("#undo")).to_be_enabled()
+    desk.locator("#overlay").focus()
+    desk.keyboard.press("Control+z")
+    expect(desk.locator("#status")).to_have_text("Saved")
+    desk.keyboard.press("Control+Shift+Z")
+    expect(desk.locator("#status")).to_have_text("1 change, not saved")
+    desk.keyboard.press("Control+s")
+    expect(desk.locator("#status")).to_have_text("Saved")
+    assert 'label = "Belt speed"      # shown large' in editor.file.read_text()
+
+
+def test_move_and_resize_by_keys(desk: Page, editor: EditorServer) -> None:
+    select(desk, "#at-speed", SPEED)
+    desk.keyboard.press("Alt+ArrowRight")
+    until(lambda: order(editor)[1:3] == ["ready", "speed"], "it comes after")
+    until(lambda: chosen(desk) == READY, "it stays selected")
+    desk.keyboard.press("Shift+ArrowLeft")
+    until(lambda: "span = 5" in editor.http.get("/text").text, "it is narrower")
+    desk.keyboard.press("Shift+ArrowDown")
+    until(lambda: "rows = 2" in editor.http.get("/text").text, "it is higher")
+    desk.keyboard.press("Alt+ArrowRight")
+    until(lambda: order(editor)[1:4] == ["ready", "speed", "open"], "it is in the next group")
+    until(lambda: chosen(desk) == OPEN, "there first")
+
+
+def test_duplicate_and_delete(desk: Page, editor: EditorServer) -> None:
+    select(desk, "#at-speed", SPEED)
+    desk.keyboard.press("Control+d")
+    until(lambda: order(editor)[1:4] == ["speed", "speed_2", "ready"], "a copy with a new id")
+    until(lambda: chosen(desk) == READY, "the copy is selected")
+    desk.keyboard.press("Delete")
+    until(lambda: order(editor)[1:3] == ["speed", "ready"], "it is gone")
+
+
+def test_copy_and_paste_the_text_of_a_table(desk: Page, editor: EditorServer) -> None:
+    desk.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    select(desk, "#at-speed", SPEED)
+    desk.keyboard.press("Control+c")
+    copied = '[[page.group.widget]]\nid = "speed"'
+    until(lambda: copied in desk.evaluate("navigator.clipboard.readText()"), "its text is there")
+    select(desk, "#at-open", OPEN)
+    desk.locator("#overlay").focus()
+    desk.keyboard.press("Control+v")
+    until(lambda: order(editor)[1:5] == ["speed", "ready", "open", "speed_2"], "after the other")
+    text = editor.http.get("/text").text
+    assert text.count('label = "Speed"      # shown large') == 2
+    until(lambda: chosen(desk) == [*OPEN[:-1], 1], "it is selected")
+
+
+def test_drag_moves_to_the_marked_place(desk: Page, editor: EditorServer) -> None:
+    start, target = box_of(desk, "#at-speed"), box_of(desk, "#at-open")
+    desk.mouse.move(*middle(start))
+    desk.mouse.down()
+    desk.mouse.move(target["x"] + target["width"] * 0.6, target["y"] + target["height"] / 2, steps=6)
+    expect(desk.locator(".drop")).to_be_visible()
+    desk.mouse.move(target["x"] + target["width"] * 0.9, target["y"] + target["height"] / 2, steps=3)
+    desk.mouse.up()
+    until(lambda: order(editor)[1:4] == ["ready", "open", "speed"], "it is after the other group's")
+    expect(desk.locator(".drop")).to_have_count(0)
+
+
+def test_a_handle_makes_wider(desk: Page, editor: EditorServer) -> None:
+    select(desk, "#at-open", OPEN)
+    handle = desk.locator(".ring.chosen i").last.bounding_box()
+    group = box_of(desk, '.group[data-group="1"]')
+    assert handle is not None
+    desk.mouse.move(*middle(handle))
+    desk.mouse.down()
+    desk.mouse.move(group["x"] + group["width"] - 4, handle["y"] + 4, steps=6)
+    desk.mouse.up()
+    until(lambda: editor.http.get("/text").text.count("span = 12") == 1, "as wide as its group")
+
+
+def test_try_presses_the_simulated_robot(desk: Page, editor: EditorServer) -> None:
+    desk.get_by_role("button", name="Try").click()
+    expect(desk.locator("#overlay")).to_be_hidden()
+    preview(desk).locator("#at-open").get_by_role("button", name="Open").click()
+    expect(preview(desk).locator("#at-open .result")).to_have_attribute("data-outcome", "succeeded")
+    desk.get_by_role("button", name="Arrange").click()
+    expect(desk.locator("#overlay")).to_be_visible()
+
+
+def test_pages_sizes_languages_and_themes(desk: Page) -> None:
+    desk.get_by_role("button", name="Watch", exact=True).click()
+    expect(preview(desk).locator("#at-load")).to_be_visible()
+    expect(desk.locator("#pages [aria-current]")).to_have_text("Watch")
+    desk.get_by_role("button", name="Deutsch").click()
+    expect(preview(desk).locator("html[lang='de']")).to_be_attached()
+    expect(desk.locator("#pages [data-page='cell']")).to_have_text("Zelle")
+    desk.get_by_role("button", name="Dark").click()
+    expect(preview(desk).locator("html[data-theme='dark']")).to_be_attached()
+    desk.get_by_role("button", name="1024 × 600").click()
+    assert preview(desk).locator("html").evaluate("() => [innerWidth, innerHeight]") == [1024, 600]
+
+
+def test_the_outline_by_keys(desk: Page) -> None:
+    tree = desk.locator(".tree")
+    first = tree.locator(".tr").first
+    first.focus()
+    desk.keyboard.press("ArrowDown")
+    focused = tree.locator(".tr:focus")
+    expect(focused).to_have_text("Cell2")
+    desk.keyboard.press("ArrowRight")
+    desk.keyboard.press("ArrowRight")
+    expect(focused).to_have_text("Belt2")
+    desk.keyboard.press("w")
+    expect(focused).to_have_text("Watch1")
+    desk.keyboard.press("Enter")
+    expect(preview(desk).locator("#at-load")).to_be_visible()
+    expect(desk.locator(CHOSEN)).to_have_text("Watch1")
+    desk.keyboard.press("Home")
+    expect(focused).to_have_text("Pages2")
+    desk.locator(".find input").fill("open")
+    expect(tree.locator(".tr:visible")).to_have_text(["Pages2", "Cell2", "Gripper1", "opencall"])
+
+
+def test_a_fault_selects_its_place_and_marks_it(desk: Page, editor: EditorServer) -> None:
+    edit = {"op": "set", "path": [*SPEED, "field"], "value": "date"}
+    editor.edit(edit).raise_for_status()
+    fault = desk.locator(".fault.is-fault")
+    expect(fault).to_contain_text("speed: field")
+    expect(desk.locator(".ring.faulty")).to_be_visible()
+    fault.click()
+    until(lambda: chosen(desk) == SPEED, "it selects its place")
+    expect(preview(desk).locator("#at-speed")).to_be_visible()
+
+
+def test_two_browsers_see_one_document(desk: Page, editor: EditorServer, chromium: Browser) -> None:
+    with chromium.new_context(viewport={"width": 1280, "height": 800}, locale="ja") as context:
+        other = context.new_page()
+        other.goto(editor.address)
+        expect(preview(other).locator("#at-speed")).to_be_visible()
+        expect(other.locator("#status")).to_have_text("保存済み")
+        select(other, "#at-open", OPEN)
+        expect(desk.locator(".ring.other .tag")).to_have_text("call: open")
+        editor.edit({"op": "set", "path": [*OPEN, "label"], "value": "Release"}).raise_for_status()
+        for page in (desk, other):
+            expect(preview(page).locator("#at-open")).to_contain_text("Release")
+    expect(desk.locator(".ring.other")).to_have_count(0)
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+def test_axe_finds_nothing(chromium: Browser, editor: EditorServer, language: str) -> None:
+    viewport: Any = {"width": 1280, "height": 800}
+    with chromium.new_context(viewport=viewport, locale=language, bypass_csp=True) as context:
+        page = context.new_page()
+        page.goto(editor.address)
+        select(page, "#at-speed", SPEED)
+        expect(page.locator("#form textarea")).to_be_visible()
+        page.evaluate(AXE)
+        violations = page.evaluate(
+            RUN.replace("document,", "{exclude: ['iframe']},"), {"values": ALL, "type": "tag"}
+        )
+        assert violations == []
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= 1280

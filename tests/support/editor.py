@@ -1,0 +1,124 @@
+"""The editor of a panel file, as `operator-panel edit` starts it."""
+
+import os
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from tests.support.parts import until
+from tests.support.processes import command
+from tests.support.processes.command import COMMAND
+
+# Two pages; the simulated robot opens and closes its gripper.
+PANEL = """\
+title = "Cell"  # the first line
+language = "en"
+languages = ["en", "de"]
+screens = ["1280x800", "1024x600"]
+
+# What the belt does.
+[[page]]
+id = "cell"
+title = { en = "Cell", de = "Zelle" }
+icon = "factory"
+
+[[page.group]]
+title = "Belt"
+span = 6
+
+[[page.group.widget]]
+id = "speed"
+kind = "readout"
+label = "Speed"      # shown large
+topic = "/speed"
+type = "std_msgs/msg/Float64"
+field = "data"
+span = 6
+
+[[page.group.widget]]
+id = "ready"
+kind = "indicator"
+label = "Ready"
+topic = "/ready"
+type = "std_msgs/msg/Bool"
+field = "data"
+span = 6
+states = [
+  { value = true, text = "Ready", shape = "circle" },
+  { value = false, text = "Not ready", shape = "cross", colour = "white" },
+]
+
+[[page.group]]
+title = "Gripper"
+span = 6
+
+[[page.group.widget]]
+id = "open"
+kind = "call"
+label = "Open"
+service = "/gripper/open"
+type = "std_srvs/srv/Trigger"
+span = 6
+
+[[page]]
+id = "watch"
+title = "Watch"
+
+[[page.widget]]
+id = "load"
+kind = "readout"
+label = "Load"
+topic = "/load"
+type = "std_msgs/msg/Float64"
+field = "data"
+"""
+
+
+class EditorServer:
+    """A running editor; `http` is a client that has its token."""
+
+    def __init__(self, file: Path, *options: str, **environment: str) -> None:
+        self.file = file
+        env = {**os.environ, "XDG_STATE_HOME": str(file.parent / "state"), **environment}
+        self.process = command.start(COMMAND, "edit", str(file), "--port", "0", *options, env=env)
+        assert self.process.stdout is not None
+        self.address = self.process.stdout.readline().strip()
+        assert self.address.startswith("http"), self.process.stderr and self.process.stderr.read()
+        self.url = self.address.partition("/?")[0]
+        self.http = httpx.Client(base_url=self.url, timeout=60, headers={"accept-language": "en"})
+        until(lambda: self.http.get(self.address).status_code == 303, "the editor answers")
+        until(lambda: self.state()["faults"] or self.state()["live"] > 0, "the preview's sessions run")
+
+    def state(self) -> dict[str, Any]:
+        known: dict[str, Any] = self.http.get("/state").json()
+        return known
+
+    def edit(self, *edits: Mapping[str, Any], revision: int | None = None) -> httpx.Response:
+        known = self.state()["revision"] if revision is None else revision
+        return self.http.post("/edits", json={"revision": known, "edits": edits})
+
+    def part(self, name: str, **query: str) -> str:
+        return self.http.get(f"/parts/{name}", params=query).raise_for_status().text
+
+    def end(self) -> None:
+        self.http.close()
+        self.process.send_signal(signal.SIGINT)
+        command.finished(self.process)
+
+
+@contextmanager
+def editing(
+    folder: Path, text: str = PANEL, *options: str, **environment: str
+) -> Iterator[EditorServer]:
+    """The editor of a file `cell.toml` with this text."""
+    file = folder / "cell.toml"
+    file.write_text(text)
+    editor = EditorServer(file, *options, **environment)
+    try:
+        yield editor
+    finally:
+        editor.end()
