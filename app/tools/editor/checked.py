@@ -1,7 +1,8 @@
 """What `operator-panel check` says of the document that is edited."""
 
 import hashlib
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -11,7 +12,8 @@ from app.panel.file.load import PanelChecker
 from app.panel.file.toml_file import TomlFile
 from app.system.errors import PanelError, Remark
 from app.tools.editor.document import Document, EditError
-from app.tools.editor.paths import path_at
+from app.tools.editor.paths import Tables, path_at
+from app.tools.editor.repairs import Repair, repair_of
 
 
 class Checked(NamedTuple):
@@ -23,6 +25,7 @@ class Checked(NamedTuple):
 
 
 NOT_CHECKED: Final = Checked(None)
+REPAIRS_S: Final = 0.15  # for looking for repairs after an edit
 
 
 class DocumentChecker:
@@ -31,6 +34,7 @@ class DocumentChecker:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._checker = PanelChecker()
+        self._mended = PanelChecker()  # for repairs: its memory is of tables that no one has written
 
     def check(self, document: Document) -> Checked:
         if document.unreadable is not None:
@@ -41,6 +45,26 @@ class DocumentChecker:
         except PanelError as error:
             return Checked(None, error.faults)
         return Checked(panel, (), self._checker.notes(panel, file))
+
+    def repairs(self, document: Document, remarks: Sequence[Remark]) -> Iterator[Repair | None]:
+        """The only repair of each remark; None where there is none. Those after `REPAIRS_S` are not
+        looked for."""
+        until, known = time.monotonic() + REPAIRS_S, {id(document.tables): tuple(remarks)}
+
+        def check(tables: Tables) -> Sequence[Remark]:
+            return known[id(tables)] if id(tables) in known else self._check_mended(document, tables)
+
+        for remark in remarks:
+            in_time = time.monotonic() < until
+            yield repair_of(remark, document.tables, check) if in_time else None
+
+    def _check_mended(self, document: Document, tables: Tables) -> Sequence[Remark]:
+        file = TomlFile(self._path, document.text, dict(tables), "", lambda _: 0)
+        try:
+            panel = self._mended.panel(file)
+        except PanelError as error:
+            return error.faults
+        return self._mended.notes(panel, file)
 
     def _file(self, document: Document) -> TomlFile:
         revision = hashlib.sha256(document.data).hexdigest()[:12]

@@ -3,7 +3,7 @@
 import asyncio
 import os
 import shutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
@@ -14,6 +14,7 @@ from app.tools.editor.checked import NOT_CHECKED, Checked, DocumentChecker
 from app.tools.editor.document import Change, Document, Edit, EditError
 from app.tools.editor.paths import tag_of
 from app.tools.editor.preview import Preview
+from app.tools.editor.repairs import Repair
 
 
 class PanelFile:
@@ -112,6 +113,11 @@ class Editor:
         if self.checked.panel is not None:
             self.preview.show(self.checked.panel, document.tables)
         self.notify()
+
+    def repairs(self) -> Iterator[Repair | None]:
+        """The only repair of each fault, of each note if there is no fault; None for those without."""
+        checked = self.checked
+        return self._checker.repairs(self.document, checked.faults or checked.notes)
 
     def notify(self) -> None:
         """Tells all browsers."""

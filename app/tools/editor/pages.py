@@ -12,6 +12,7 @@ from app.tools.editor.editor import Editor, Part, PartRequest
 from app.tools.editor.outline import outline
 from app.tools.editor.paths import at, kind_of, path_at, table_at, tag_of, title_of, widget_paths
 from app.tools.editor.places import page_of, places_on
+from app.tools.editor.repairs import Repair
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 THEMES: Final = (
@@ -136,14 +137,18 @@ class FaultRow(NamedTuple):
     line: int
     path: Path
     page: str
+    repair: Repair | None = None
 
 
 def _faults(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
-    checked, tables = request.editor.checked, request.editor.document.tables
+    editor = request.editor
+    checked, tables = editor.checked, editor.document.tables
     rows = [
         *(_fault_row(fault, True, tables) for fault in checked.faults),
         *(_fault_row(note, False, tables) for note in checked.notes),
     ]
+    # Notes come only without a fault.
+    rows = [row._replace(repair=repair) for row, repair in zip(rows, editor.repairs(), strict=True)]
     faults, notes = len(checked.faults), len(checked.notes)
     return "_faults.html", {
         "rows": rows,
@@ -151,6 +156,7 @@ def _faults(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
         "notes": _counted("editor_note_one", "editor_note_many", notes),
         "good": say("editor_no_faults"),
         "says": say("editor_as_check"),
+        "repair": lambda words: say("editor_repair", words=words),
         "line": lambda number: say("editor_line", number=number),
     }
 

@@ -83,6 +83,27 @@ get("pages").addEventListener("click", (event) => {
   if (key?.dataset.page) preview.showPage(key.dataset.page);
 });
 
+// The editor itself is light or dark as its reader's system is.
+const isDark = matchMedia("(prefers-color-scheme: dark)");
+const showTheme = () => {
+  document.documentElement.dataset.theme = isDark.matches ? "dark" : "light";
+};
+isDark.addEventListener("change", showTheme);
+showTheme();
+
+// The page may be in another language and theme than the file says, as this browser has chosen before.
+function markChoices() {
+  const { lang, dataset } = preview.shownDocument()?.documentElement ?? {};
+  if (lang) press("language", lang);
+  if (dataset?.theme) press("theme-of", dataset.theme);
+}
+preview.onDrawn(markChoices);
+
+get("faults").addEventListener("click", (event) => {
+  const button = event.target instanceof Element ? event.target.closest("[data-repair]") : null;
+  if (button?.dataset.repair) edit(JSON.parse(button.dataset.repair));
+});
+
 function markPage() {
   for (const key of get("pages").querySelectorAll("[data-page]")) {
     if (key.dataset.page === preview.shownPage()) key.setAttribute("aria-current", "page");

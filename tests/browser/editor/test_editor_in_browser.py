@@ -264,6 +264,14 @@ def test_a_fault_selects_its_place_and_marks_it(desk: Page, editor: EditorServer
     expect(preview(desk).locator("#at-speed")).to_be_visible()
 
 
+def test_the_only_repair_of_a_fault_is_a_press_away(desk: Page, editor: EditorServer) -> None:
+    wrong = {"op": "set", "path": [*OPEN, "kind"], "value": "cal"}
+    editor.edit(wrong).raise_for_status()
+    desk.get_by_role("button", name="Write call").click()
+    expect(desk.locator(".fault.is-fault")).to_have_count(0)
+    assert editor.http.get("/text").text == PANEL
+
+
 def test_two_browsers_see_one_document(desk: Page, editor: EditorServer, chromium: Browser) -> None:
     with chromium.new_context(viewport={"width": 1280, "height": 800}, locale="ja") as context:
         other = context.new_page()
