@@ -1,6 +1,7 @@
 """A panel file as a document that is edited: its text, its tables, and each change as one step that can
 be undone. The lines that no edit speaks of stay as they are, byte for byte."""
 
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
@@ -125,7 +126,11 @@ OPERATIONS: Final[Mapping[str, tuple[type[Edit], tuple[str, ...]]]] = {
 
 
 def edit_from(data: Any) -> Edit:
-    """The edit of a JSON value; EditError for one that is malformed."""
+    """The edit of a JSON value; EditError for one that is malformed. `toml` in place of `value` is the
+    text of a value, for what JSON does not have: a float such as 5.0, a date."""
+    if isinstance(data, Mapping) and "toml" in data and "value" not in data:
+        others = {key: value for key, value in data.items() if key != "toml"}
+        data = {**others, "value": _value_from(data["toml"])}
     if not isinstance(data, Mapping) or data.get("op") not in OPERATIONS:
         raise EditError(say("edit_malformed", known=", ".join(OPERATIONS)))
     edit, names = OPERATIONS[data["op"]]
@@ -138,6 +143,16 @@ def edit_from(data: Any) -> Edit:
     if not isinstance(values.get("id", ""), str) or not isinstance(values.get("text", ""), str):
         raise EditError(say("edit_malformed", known=", ".join(names)))
     return edit(**values)
+
+
+def _value_from(text: Any) -> Any:
+    try:
+        tables = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError) as error:
+        raise EditError(say("edit_not_toml", reason=str(error))) from error
+    if tables.keys() != {"value"}:
+        raise EditError(say("edit_malformed", known="toml"))
+    return tables["value"]
 
 
 def path_from(data: Any) -> Path:

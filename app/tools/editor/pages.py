@@ -1,16 +1,28 @@
 """The editor's page and its panes: what their templates are rendered with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from app.panel.file.toml_lines import Path
-from app.system.errors import NotFound, Remark
+from app.ros.messages import Interfaces, load_interfaces
+from app.system.errors import InterfaceError, NotFound, Remark
+from app.system.pictures import shipped_pictures
 from app.system.texts import TextLike, render, say
 from app.system.texts.locales import own_name
 from app.tools.editor.document import DiffLine
 from app.tools.editor.editor import Editor, Part, PartRequest
+from app.tools.editor.forms import FormPage, Link, form_context, form_of, table_path
 from app.tools.editor.outline import outline
-from app.tools.editor.paths import at, kind_of, path_at, table_at, tag_of, title_of, widget_paths
+from app.tools.editor.paths import (
+    at,
+    kind_of,
+    path_at,
+    path_of,
+    table_at,
+    tag_of,
+    title_of,
+    widget_paths,
+)
 from app.tools.editor.places import page_of, places_on
 from app.tools.editor.repairs import Repair
 
@@ -26,8 +38,6 @@ LEFT_WORDS: Final = {
     "outline": "editor_tab_outline",
     "parts": "editor_tab_parts",
 }
-# Tables that the right pane offers for what is around the selection, with the words of their tabs.
-TABS: Final = {"widget": "editor_tab_widget", "group": "editor_tab_group", "page": "editor_tab_page"}
 
 # The words of the page itself.
 WORDS: Final = {
@@ -57,14 +67,6 @@ class PageTab(NamedTuple):
     id: str
     title: str
     icon: str
-
-
-class Tab(NamedTuple):
-    """`path` is that of the table which it shows."""
-
-    title: TextLike
-    path: Path
-    is_chosen: bool
 
 
 def page_context(editor: Editor, language: str, revision: str) -> dict[str, Any]:
@@ -204,32 +206,55 @@ def _with_gaps(lines: Sequence[DiffLine], total: int) -> list[tuple[str, int, Te
 
 
 def _form(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
-    """The selected table as text, until it has a form."""
-    document = request.editor.document
-    path = request.path
-    if path and at(document.tables, path) is None:
-        path = ()
-    first, last = document.lines(path)
-    return "_form.html", {
-        "tabs": _tabs(document.tables, path),
-        "path": path,
-        "title": title_of(at(document.tables, path)) if path else request.editor.file.path.name,
-        "kind": kind_of(document.tables, path),
-        "lines": say("editor_lines", first=first, last=last),
-        "text": document.text_of(path),
-        "words": {"apply": say("editor_apply"), "text": say("editor_text_of_table")},
+    """The form of the selected table, the tables that refer to it, or its text."""
+    editor, query, tables = request.editor, request.query, request.editor.document.tables
+    path = table_path(tables, request.path)
+    used = [*_users(editor, path)]
+    form = form_of(
+        tables,
+        path,
+        interfaces=_interfaces(editor),
+        faults=editor.checked.faults,
+        language=request.language,
+        pictures=_pictures(editor),
+        kind=query.get("kind", ""),
+        used_by=len(used),
+    )
+    is_there = path == () or at(tables, path) is not None
+    page = FormPage(
+        view=query.get("view", "form"),
+        text=editor.document.text_of(path) if is_there else "",
+        lines=editor.document.lines(path) if is_there else (0, 0),
+        used=tuple(used),
+        pick=path_of(query["pick"]) if query.get("pick") else None,
+    )
+    return "_form.html", form_context(form, page)
+
+
+def _users(editor: Editor, path: Path) -> Iterator[Link]:
+    """The tables that refer to the one at a path, each once, with the key by which they do."""
+    tables = editor.document.tables
+    keys = {
+        table: str(next(step for step in reversed(reference) if isinstance(step, str)))
+        for reference in editor.document.references(path)
+        for table in (table_path(tables, reference),)
     }
+    for table, key in keys.items():
+        yield Link(table, title_of(at(tables, table)) or kind_of(tables, table), key)
 
 
-def _tabs(tables: Mapping[str, Any], path: Path) -> Sequence[Tab]:
-    """The selected table and those around it, the innermost first."""
-    tabs = []
-    for end in range(len(path), 0, -1):
-        if isinstance(at(tables, path[:end]), Mapping):
-            step = next(step for step in reversed(path[:end]) if isinstance(step, str))
-            word = TABS.get(step)
-            tabs.append(Tab(say(word) if word else step, path[:end], end == len(path)))
-    return [*tabs, Tab(say("editor_tab_panel"), (), not path)]
+def _interfaces(editor: Editor) -> Interfaces | None:
+    """The message types of the panel; None if its folders have faults."""
+    panel = editor.preview.panel
+    try:
+        return load_interfaces(panel.distro, panel.interfaces) if panel else load_interfaces("jazzy")
+    except InterfaceError:
+        return None
+
+
+def _pictures(editor: Editor) -> Sequence[str]:
+    panel = editor.preview.panel
+    return sorted({*shipped_pictures(), *(panel.picture_files if panel else ())})
 
 
 def _delete(request: PartRequest) -> tuple[str, Mapping[str, Any]]:

@@ -20,6 +20,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.system.errors import KioskError, NotFound
 from app.system.settings import Settings, shipped_path
 from app.system.texts import localized, say
+from app.tools.editor import uploads
 from app.tools.editor.checked import DocumentChecker
 from app.tools.editor.document import Change, EditError, edit_from, path_from
 from app.tools.editor.editor import Browser, Editor, PanelFile, PartRequest
@@ -46,7 +47,7 @@ NOT_KEPT: Final = {"cache-control": "no-store"}
 SHEET: Final = "editor.css"
 # Before the editor's own style.
 LAYERS: Final = ("tokens", "priorities")
-SHARED_SCRIPTS: Final = ()
+SHARED_SCRIPTS: Final = ("in-place.js",)
 
 
 class Edits(BaseModel):
@@ -193,7 +194,9 @@ def _files() -> tuple[Mapping[str, Asset], str]:
     sheets += sorted((static / "css/editor").glob("*.css"))
     files = {SHEET: asset(b"\n".join(sheet.read_bytes() for sheet in sheets), ".css")}
     for script in sorted((static / "js/editor").glob("*.js")):
-        files[script.name] = asset(script.read_bytes(), ".js")
+        files[f"editor/{script.name}"] = asset(script.read_bytes(), ".js")
+    for name in SHARED_SCRIPTS:
+        files[name] = asset((static / "js" / name).read_bytes(), ".js")
     for font in sorted((static / FONTS).glob("*.woff2")):
         files[f"{FONTS}/{font.name}"] = Asset(font.read_bytes(), "font/woff2", False)
     digest = hashlib.sha256()
@@ -246,6 +249,15 @@ def _add_routes(app: FastAPI) -> None:
     async def paste_text(posted: Pasted, request: Request, editor: CurrentEditor) -> Response:
         edit = paste(editor.document.tables, path_from(posted.path), posted.text)
         return _step(request, editor, lambda: editor.apply([edit], posted.label))
+
+    @app.post("/files")
+    async def upload(path: str, name: str, request: Request, editor: CurrentEditor) -> Response:
+        data = bytearray()
+        async for chunk in request.stream():
+            data += chunk
+            if len(data) > uploads.MOST_BYTES:
+                break
+        return _step(request, editor, lambda: uploads.store(editor, path_of(path), name, bytes(data)))
 
     @app.post("/undo")
     async def undo(request: Request, editor: CurrentEditor) -> Response:

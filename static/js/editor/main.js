@@ -5,7 +5,7 @@ import * as outline from "./outline.js";
 import * as panes from "./panes.js";
 import * as preview from "./preview.js";
 import { select } from "./selection.js";
-import { edit, onMessage, onState, open, step } from "./wire.js";
+import { onMessage, onState, open, step } from "./wire.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -112,15 +112,6 @@ function markPage() {
 }
 preview.onDrawn(markPage);
 panes.onPane((pane) => pane === get("pages") && markPage());
-
-// A table as text is one edit when it is sent.
-get("form").addEventListener("submit", async (event) => {
-  event.preventDefault();
-  const form = event.target;
-  if (!(form instanceof HTMLFormElement) || !form.dataset.textOf) return;
-  const text = String(new FormData(form).get("text") ?? "");
-  await edit([{ op: "text", path: JSON.parse(form.dataset.textOf), text }]);
-});
 
 panes.start();
 outline.start();

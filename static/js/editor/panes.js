@@ -1,7 +1,8 @@
 // The panes beside and below the preview: fragments of the server, put into the page as they come.
 import { isSame, onSelect, select, selection } from "./selection.js";
+import { Form } from "./form.js";
 import { onDrawn } from "./preview.js";
-import { onState, part, state } from "./wire.js";
+import { onState, part, state, tryEdit, upload } from "./wire.js";
 
 /** @typedef {import("./wire.js").Path} Path */
 
@@ -9,6 +10,13 @@ const left = /** @type {HTMLElement} */ (document.getElementById("left"));
 const form = /** @type {HTMLElement} */ (document.getElementById("form"));
 const faults = /** @type {HTMLElement} */ (document.getElementById("faults"));
 const diff = /** @type {HTMLElement} */ (document.getElementById("diff"));
+
+const shown = new Form(form, {
+  post: tryEdit,
+  load: (query) => part("form", query),
+  select: (path) => select(path, "form"),
+  upload,
+});
 
 // The page itself is drawn first after an edit; without it the panes wait no longer than this.
 const AFTER_MS = 300;
@@ -19,7 +27,7 @@ async function fillAll() {
   if (!isOutdated) return;
   isOutdated = false;
   clearTimeout(timer);
-  await Promise.all([fill(form, "form"), fill(faults, "faults"), fill(diff, "diff")]);
+  await Promise.all([shown.refresh(), fill(faults, "faults"), fill(diff, "diff")]);
   await fill(left, left.dataset.part ?? "outline");
 }
 
@@ -115,7 +123,7 @@ export function start() {
     timer = setTimeout(fillAll, now.drawn === before.drawn ? 0 : AFTER_MS);
   });
   onDrawn(fillAll);
-  onSelect(() => fill(form, "form"));
+  onSelect(() => shown.show(selection() ?? []));
   onPane((pane) => pane === faults && markFault());
   onSelect(markFault);
   if (state.revision) showTab(left.dataset.part ?? "outline");

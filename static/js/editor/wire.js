@@ -14,10 +14,13 @@
  * @property {number} faults
  * @property {OtherBrowser[]} others
  */
-/** @typedef {{ op: string, path: Path, value?: unknown, to?: Path, id?: string, text?: string }} Edit */
+/** @typedef {{ op: string, path: Path, value?: unknown, toml?: string, to?: Path, id?: string, text?: string }} Edit */
 /** @typedef {{ revision: number, drawn: number, select?: Path | null, message?: string, path?: Path }} Answer */
 
 const REOPEN_MS = 1000;
+const OK = 200;
+const NOT_OK = 300;
+const BEHIND = 409;
 const JSON_BODY = { "content-type": "application/json" };
 
 export const browser = crypto.randomUUID();
@@ -87,23 +90,48 @@ function inTurn(task) {
   return done;
 }
 
-/** @param {string} path @param {unknown} [body] @returns {Promise<Answer | null>} */
-async function post(path, body = {}) {
+/** @param {string} path @param {BodyInit} body @param {Record<string, string>} [headers] */
+async function send(path, body, headers = JSON_BODY) {
   let response;
   try {
-    response = await fetch(path, { method: "POST", headers: JSON_BODY, body: JSON.stringify(body) });
+    response = await fetch(path, { method: "POST", headers, body });
   } catch {
-    say(document.body.dataset.lost ?? "");
-    return null;
+    return { status: 0, answer: { message: document.body.dataset.lost ?? "" } };
   }
   const answer = response.status === 204 ? {} : await response.json();
   if ("revision" in answer) update(answer);
-  if (response.ok) {
-    say("");
-    return answer;
-  }
-  say(answer.message ?? answer.error ?? "");
-  return null;
+  return { status: response.status, answer };
+}
+
+/** @param {string} path @param {unknown} [body] @returns {Promise<Answer | null>} */
+async function post(path, body = {}) {
+  const { status, answer } = await send(path, JSON.stringify(body));
+  const isDone = status >= OK && status < NOT_OK;
+  say(isDone ? "" : (answer.message ?? answer.error ?? ""));
+  return isDone ? answer : null;
+}
+
+// The same without a message for the whole page: who posts says why it was refused.
+/** @param {string} path @param {() => BodyInit} body @param {Record<string, string>} [headers] */
+function attempt(path, body, headers) {
+  return inTurn(async () => {
+    const { status, answer } = await send(path, body(), headers);
+    const isDone = status >= OK && status < NOT_OK;
+    if (isDone) say("");
+    return { ok: isDone, behind: status === BEHIND, message: answer.message ?? answer.error ?? "" };
+  });
+}
+
+/** @param {Edit[]} edits @param {string} label */
+export function tryEdit(edits, label) {
+  return attempt("/edits", () => JSON.stringify({ revision: state.revision, edits, label }));
+}
+
+// Stores a file beside the panel's, and names it at the key of the path.
+/** @param {Path} path @param {File} file */
+export function upload(path, file) {
+  const query = new URLSearchParams({ path: JSON.stringify(path), name: file.name });
+  return attempt(`/files?${query}`, () => file, { "content-type": "application/octet-stream" });
 }
 
 // Changes the document, as one step that can be undone; the server's answer, null if it was refused.

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, FloatRect, FrameLocator, Page, expect
+from playwright.sync_api import Browser, FilePayload, FloatRect, FrameLocator, Page, expect
 
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
@@ -223,10 +223,10 @@ def test_pages_sizes_languages_and_themes(desk: Page) -> None:
     desk.get_by_role("button", name="Watch", exact=True).click()
     expect(preview(desk).locator("#at-load")).to_be_visible()
     expect(desk.locator("#pages [aria-current]")).to_have_text("Watch")
-    desk.get_by_role("button", name="Deutsch").click()
+    desk.get_by_role("button", name="Deutsch", exact=True).click()
     expect(preview(desk).locator("html[lang='de']")).to_be_attached()
     expect(desk.locator("#pages [data-page='cell']")).to_have_text("Zelle")
-    desk.get_by_role("button", name="Dark").click()
+    desk.get_by_role("button", name="Dark", exact=True).click()
     expect(preview(desk).locator("html[data-theme='dark']")).to_be_attached()
     desk.get_by_role("button", name="1024 × 600").click()
     assert preview(desk).locator("html").evaluate("() => [innerWidth, innerHeight]") == [1024, 600]
@@ -293,7 +293,7 @@ def test_axe_finds_nothing(chromium: Browser, editor: EditorServer, language: st
         page = context.new_page()
         page.goto(editor.address)
         select(page, "#at-speed", SPEED)
-        expect(page.locator("#form textarea")).to_be_visible()
+        expect(page.locator("#form [data-form]")).to_be_visible()
         page.evaluate(AXE)
         violations = page.evaluate(
             RUN.replace("document,", "{exclude: ['iframe']},"), {"values": ALL, "type": "tag"}
@@ -301,3 +301,44 @@ def test_axe_finds_nothing(chromium: Browser, editor: EditorServer, language: st
         assert violations == []
         wide = page.evaluate("document.documentElement.scrollWidth")
         assert wide <= 1280
+
+
+def test_a_typed_label_is_on_the_page_and_in_the_diff_and_undone(desk: Page) -> None:
+    select(desk, "#at-speed", SPEED)
+    label = desk.locator("#form input[lang=en]").first
+    expect(label).to_have_value("Speed")
+    label.fill("Pace")
+    label.press("Enter")
+    expect(preview(desk).locator("#at-speed")).to_contain_text("Pace")
+    expect(desk.locator("#diff")).to_contain_text('label = "Pace"      # shown large')
+    expect(label).to_be_focused()
+    desk.locator("#undo").click()
+    expect(label).to_have_value("Speed")
+    expect(preview(desk).locator("#at-speed")).to_contain_text("Speed")
+
+
+def test_a_wrong_value_is_named_at_its_field_and_in_the_list(desk: Page) -> None:
+    select(desk, "#at-speed", SPEED)
+    age = desk.get_by_label("Old after")
+    age.fill("soon")
+    age.press("Enter")
+    expect(desk.locator("#form .why")).to_contain_text('must be a number, not "soon"')
+    expect(desk.locator("#faults")).to_contain_text('must be a number, not "soon"')
+    expect(age).to_have_value("soon")
+    desk.locator("#undo").click()
+    expect(desk.locator("#form .why")).to_have_count(0)
+
+
+def test_a_picture_is_chosen_and_shown(desk: Page) -> None:
+    select(desk, "#at-speed", SPEED)
+    desk.locator("#form select[data-kinds]").select_option(label="image")
+    desk.get_by_role("button", name="Apply").click()
+    expect(desk.locator("#form")).to_contain_text("is missing")
+    data = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 4 3"/>'
+    desk.locator("#form input[data-upload]").set_input_files(
+        FilePayload(name="plan.svg", mimeType="image/svg+xml", buffer=data)
+    )
+    expect(preview(desk).locator("#at-speed img")).to_be_attached()
+    desk.locator("#undo").click()
+    desk.locator("#undo").click()
+    expect(preview(desk).locator("#at-speed img")).to_have_count(0)
