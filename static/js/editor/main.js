@@ -5,7 +5,7 @@ import * as outline from "./outline.js";
 import * as panes from "./panes.js";
 import * as preview from "./preview.js";
 import { select } from "./selection.js";
-import { onMessage, onState, open, step } from "./wire.js";
+import { edit, onMessage, onState, open, step } from "./wire.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
