@@ -2,7 +2,8 @@
 the server from other work, and the CPU time of the server while a robot drives on its map.
 
 The robot speaks Zenoh like one behind a bridge; Chromium shows the page. Needs no bridge and no ROS 2.
-With `QUICK=1` some seconds. Prints a table.
+With `QUICK=1` some seconds. Prints a table. After `make bench-setup` it has rows of a rival: rosbridge
+with a plain page on roslib, and a ROS 2 node.
 """
 
 import math
@@ -17,16 +18,23 @@ from typing import Final
 
 import httpx
 import zenoh
+from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import Page, sync_playwright
 
 from app.ros.messages import load_interfaces
 from bench.light import Bench, Served
 from bench.over_zenoh import OverZenoh
+from bench.parts import Meter, family
+from bench.peer import Place
+from bench.peers import rosbridge_map
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, until, zenoh_file
 
 QUICK: Final = bool(os.environ.get("QUICK"))
 FOR_S: Final = 3.0 if QUICK else 20.0
 SIDE: Final = 1_000 if QUICK else 4_000  # cells of the large map
+MIDDLE: Final = 500  # cells of a map that the rival shows: one of 700 x 700 never comes
+RIVAL_S: Final = 5.0  # between two maps of the rival's node, until one is shown
+DOMAIN: Final = 77
 EVERY_S: Final = 0.005  # between two requests that wait for the event loop
 INTERFACES: Final = load_interfaces("jazzy")
 TYPES: Final = {
@@ -191,8 +199,12 @@ def large(folder: Path) -> Iterator[tuple[str, float, str]]:
     first, second = grid(SIDE), grid(SIDE, 7)
     with shown(folder, MAP) as (robot, server, page):
         began = time.monotonic()
+        robot.put("map", grid(MIDDLE))
+        before = wait_for_map(page)
+        yield f"{MIDDLE} x {MIDDLE}, published to shown", time.monotonic() - began, "s to the screen"
+        began = time.monotonic()
         robot.put("map", first)
-        version = wait_for_map(page)
+        version = wait_for_map(page, before)
         yield f"{SIDE} x {SIDE}, published to shown", time.monotonic() - began, "s to the screen"
         began = time.monotonic()
         page.reload()
@@ -233,7 +245,9 @@ def load(folder: Path) -> Iterator[tuple[str, float, str]]:
         wait_for_map(page)
         yield "at rest, page open", measured(server), "% of a core"
         with Rate((10, move)):
+            own = Meter(browser_pids)
             yield "pose at 10 Hz", measured(server), "% of a core"
+            yield "the same, browser", own.percent(), "% of a core in the browser"
         with Rate((10, move), (1, next_map)):
             before = wait_for_map(page)
             wait_for_map(page, before)  # it changes
@@ -253,12 +267,63 @@ def load(folder: Path) -> Iterator[tuple[str, float, str]]:
             yield name, measured(server), "% of a core"
 
 
+def rival(folder: Path) -> Iterator[tuple[str, float, str]]:
+    """rosbridge in Rust with a page on roslib; none without `make bench-setup`."""
+    if not rosbridge_map.is_installed():
+        return
+    place = Place("", DOMAIN, folder)
+    with rosbridge_map.served(place, MIDDLE) as (node, server), sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=str(CHROMIUM), args=CHROMIUM_FLAGS)
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.goto(server.url)
+        page.wait_for_selector("[data-ready=true]")
+        shown = 0
+        while not shown:  # until the subscription has reached the node
+            node.order("map")
+            shown = maps_shown(page, 0, RIVAL_S)
+        time.sleep(1.0)
+        shown = maps_shown(page, 0, RIVAL_S)
+        began = time.monotonic()
+        node.order("map")
+        maps_shown(page, shown, 10 * RIVAL_S)
+        name = f"rosbridge + roslib: {MIDDLE} x {MIDDLE}, published to shown"
+        yield name, time.monotonic() - began, "s to the screen"
+        node.order("drive")
+        time.sleep(2.0)
+        meter, own = Meter(lambda: family(server.pids)), Meter(browser_pids)
+        time.sleep(FOR_S)
+        yield "rosbridge + roslib: pose at 10 Hz", meter.percent(), "% of a core"
+        yield "the same, browser", own.percent(), "% of a core in the browser"
+        browser.close()
+
+
+def maps_shown(page: Page, but: int, within_s: float) -> int:
+    """How many maps the rival's page has shown, when there are more; `but` if there are no more."""
+    try:
+        handle = page.wait_for_function(
+            "(but) => { const n = Number(document.querySelector('main').dataset.maps);"
+            " return n > but && n; }",
+            arg=but,
+            polling=10,
+            timeout=1000 * within_s,
+        )
+    except PlaywrightError:
+        return but
+    return int(str(handle.json_value()))
+
+
+def browser_pids() -> list[int]:
+    """The processes of Chromium that this program has started."""
+    return [pid for pid in family([os.getpid()]) if "chrom" in os.readlink(f"/proc/{pid}/exe")]
+
+
 def main() -> None:
     print("| what | measured | asked |\n| --- | --- | --- |", flush=True)
-    for rows in (large, load):
+    for rows in (large, load, rival):
         with tempfile.TemporaryDirectory() as folder:
             for name, value, unit in rows(Path(folder)):
-                print(f"| {name} | {value:.2f} {unit} | {ASKED[unit]:g} |", flush=True)
+                asked = f"{ASKED[unit]:g}" if unit in ASKED and rows is not rival else ""
+                print(f"| {name} | {value:.2f} {unit} | {asked} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -45,4 +45,4 @@ async function bundle(peer) {
   });
 }
 
-Promise.all(["rosbridge_rs", "zenoh_ts"].map(bundle)).catch(() => process.exit(1));
+Promise.all(["rosbridge_rs", "rosbridge_map", "zenoh_ts"].map(bundle)).catch(() => process.exit(1));
