@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from app.panel.alarm import Alarm, inhibited_name
 from app.panel.base import FileContext, TopicQos
 from app.panel.condition import Condition, Interlock, NamedCondition
-from app.panel.geojson import FileZones, read_zones
 from app.panel.keys import SUMS, PanelKeys
 from app.panel.keys import RobotEntry as RobotEntry
 from app.panel.layout import FRAMES, Page
@@ -48,6 +47,9 @@ from app.system.errors import NotFound
 from app.system.pictures import picture_files, shipped_pictures
 from app.system.texts import PanelText
 from app.system.texts.catalogue import files
+
+if TYPE_CHECKING:
+    from app.panel.geojson import FileZones
 
 # Buttons that are judged as one.
 
@@ -326,8 +328,12 @@ class Panel(PanelKeys):
         return {str(w.id): w for w in self.widgets() if isinstance(w, MapView)}
 
     @cached_property
-    def zones_of_files(self) -> tuple[FileZones, ...]:
+    def zones_of_files(self) -> "tuple[FileZones, ...]":
         """The zones of each GeoJSON file of zones."""
+        if not self.zone_files:
+            return ()
+        from app.panel.geojson import read_zones
+
         read = []
         for table in self.zone_files:
             context = FileContext(table.file.parent, self.language)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
@@ -18,7 +18,6 @@ from app.panel.base import (
     TopicName,
     TopicQos,
 )
-from app.panel.geojson import RouteGraph, read_route_graph
 from app.panel.places import FrameName, Metres, Place, Yaw
 from app.panel.shared_keys import AgeKey, RobotsKey, TopicKeys
 from app.panel.widgets.displays import PictureName, picture_faults
@@ -42,6 +41,9 @@ from app.ros.dialects.dialect import Role
 from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
 from app.system.errors import Fault
+
+if TYPE_CHECKING:
+    from app.panel.geojson import RouteGraph
 
 POSE_PATHS: Final = {
     "geometry_msgs/msg/PoseStamped": "pose",
@@ -79,7 +81,9 @@ class MapRoutes(Description):
     level: Id | None = None
 
     @cached_property
-    def graph(self) -> RouteGraph:
+    def graph(self) -> "RouteGraph":
+        from app.panel.geojson import read_route_graph  # few panels have a graph
+
         return read_route_graph(self.file)
 
 
