@@ -16,6 +16,7 @@ from app.system.texts import TextLike, say
 from app.system.toml_values import key_text, value_text
 from app.tools.editor import table_text
 from app.tools.editor.references import (
+    LOCAL,
     NAMED,
     Group,
     Owner,
@@ -37,6 +38,7 @@ from app.tools.editor.sections import (
     has_header,
     header_text,
     is_list,
+    keys_of,
     new_sections,
     paths_of,
     split,
@@ -169,7 +171,7 @@ class Change:
     after it."""
 
     revision: int
-    label: str
+    label: TextLike
     paths: tuple[Path, ...]
     select: Path
 
@@ -238,15 +240,15 @@ class Document:
         return self._state.unreadable
 
     @property
-    def undo_label(self) -> str | None:
+    def undo_label(self) -> TextLike | None:
         """The label of the step that `undo` takes back; None for none."""
         return self._done[-1].change.label if self._done else None
 
     @property
-    def redo_label(self) -> str | None:
+    def redo_label(self) -> TextLike | None:
         return self._undone[-1].change.label if self._undone else None
 
-    def apply(self, edits: Iterable[Edit], label: str) -> Change:
+    def apply(self, edits: Iterable[Edit], label: TextLike) -> Change:
         """Makes all edits as one step, or none: EditError."""
         draft = Draft(self._state)
         paths: list[Path] = []
@@ -391,10 +393,6 @@ def _locate(paths: Sequence[Path], path: Path) -> tuple[int, Path]:
         if len(each) >= len(paths[best]) and path[: len(each)] == each:
             best = number
     return best, path[len(paths[best]) :]
-
-
-def _keys(path: Path) -> Keys:
-    return tuple(step for step in path if isinstance(step, str))
 
 
 class Draft:
@@ -554,7 +552,7 @@ class Draft:
             return
         if not isinstance(around, dict):
             raise EditError(say("edit_not_a_table", place=place_of(parent)), path)
-        keys = _keys(path)
+        keys = keys_of(path)
         if self._takes_headers(parent) and has_header(keys, value):
             for n, table in enumerate(value if isinstance(value, list) else [value]):
                 many = isinstance(value, list)
@@ -572,7 +570,7 @@ class Draft:
 
     def _insert_header(self, path: Path) -> None:
         """The header of a table that has only those of tables in it."""
-        keys = _keys(path)
+        keys = keys_of(path)
         at = _inside(self.paths, path)[0]
         new = new_sections(keys, {}, False, self.newline)
         new = new or [_empty_section(keys, self.newline)]
@@ -599,12 +597,12 @@ class Draft:
                 raise EditError(
                     say("edit_needs_table", place=place_of(parent), value=_shown(value)), path
                 )
-            self._insert_sections(path, new_sections(_keys(parent), value, True, self.newline), index)
+            self._insert_sections(path, new_sections(keys_of(parent), value, True, self.newline), index)
         elif around:
             self._edit_body(path, lambda body, rest: table_text.insert_value(body, rest, value))
         else:
             if self._get(parent) is not MISSING:
-                if not (self._takes_headers(parent[:-1]) and has_header(_keys(parent), [value])):
+                if not (self._takes_headers(parent[:-1]) and has_header(keys_of(parent), [value])):
                     self._edit_body(path, lambda body, rest: table_text.insert_value(body, rest, value))
                     return
                 self.delete(parent)
@@ -673,7 +671,7 @@ class Draft:
         pieces = [self.sections[n] for n in _inside(self.paths, path)]
         self.delete(path)
         if pieces and isinstance(value, dict) and self._takes_sections(target):
-            self._put_pieces(pieces, _keys(path), to)
+            self._put_pieces(pieces, keys_of(path), to)
         else:
             self.insert(to, value)
 
@@ -684,7 +682,7 @@ class Draft:
             return False
         if self._in_sections(target):
             return True
-        return around is MISSING and self._takes_headers(target[:-1]) and is_list(_keys(target))
+        return around is MISSING and self._takes_headers(target[:-1]) and is_list(keys_of(target))
 
     def _put_pieces(self, pieces: Sequence[Section], keys: Keys, to: Path) -> None:
         """Sections of a table with `keys` as those of an element of another list."""
@@ -696,7 +694,7 @@ class Draft:
             raise EditError(say("edit_index", place=place_of(to[:-1]), number=count, index=index), to)
         if (parent := to[:-2]) and self._get(parent) is MISSING and len(parent) > 1:
             raise EditError(say("edit_no_place", place=place_of(parent)), to)
-        own = _keys(to)
+        own = keys_of(to)
         new = [
             piece if own == keys else piece.with_keys((*own, *piece.keys[len(keys) :]))
             for piece in pieces
@@ -711,7 +709,7 @@ class Draft:
             raise EditError(say("edit_key_taken", place=place_of(to)), to)
         if path[:-1] == to[:-1]:
             if inside := _inside(self.paths, path):
-                old, new = _keys(path), _keys(to)
+                old, new = keys_of(path), keys_of(to)
                 sections = list(self.sections)
                 for n in inside:
                     sections[n] = sections[n].with_keys((*new, *sections[n].keys[len(old) :]))
@@ -744,7 +742,7 @@ class Draft:
         pieces = [self.sections[n] for n in _inside(self.paths, path)]
         taken = taken_ids(self.tables)
         if pieces and isinstance(value, dict) and self._takes_sections(to[:-1]):
-            self._put_pieces(pieces, _keys(path), to)
+            self._put_pieces(pieces, keys_of(path), to)
         else:
             self.insert(to, value)
         self.with_new_ids(to, taken)
@@ -761,7 +759,7 @@ class Draft:
         known = {group: set(ids) for group, ids in taken.items()}
         names: dict[Owner, str] = {}
         for owner in owners(self.tables, path):
-            if owner.id in taken[owner.group]:
+            if owner.group not in LOCAL and owner.id in taken[owner.group]:
                 names[owner] = free_id(owner.id, known[owner.group])
                 known[owner.group].add(names[owner])
         self._rename_references(names, path)
@@ -792,7 +790,8 @@ class Draft:
         if new == owner.id:
             return
         for other in owners(self.tables):
-            if other.group == owner.group and other.id == new:
+            beside = owner.group not in LOCAL or other.path[:-1] == owner.path[:-1]
+            if (other.group, other.id) == (owner.group, new) and beside:
                 raise EditError(say("edit_id_taken", id=new, place=place_of(other.path)), path)
         self._rename_references({owner: new})
         self.put(owner.place, new)
@@ -826,7 +825,7 @@ class Draft:
             raise EditError(say("edit_not_toml", reason=str(opened.unreadable)), path)
         root, *new = opened.sections
         kind = type(self._get(path))
-        keys = _keys(path)
+        keys = keys_of(path)
         first = header_text(keys, isinstance(path[-1], int))
         if new and not root.own:
             new[0] = _with_above(new[0], root.text)

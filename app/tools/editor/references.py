@@ -11,7 +11,9 @@ from app.panel.file.toml_lines import Path
 
 Tables = Mapping[str, Any]
 # What shares its ids: recipes are pressed as widgets are, interlocks and conditions are named alike.
-Group = Literal["widget", "condition", "source", "alarm", "robot", "page", "place", "zone", "role"]
+Group = Literal[
+    "widget", "condition", "source", "alarm", "robot", "page", "place", "zone", "role", "level"
+]  # fmt: skip
 # How an id is named: as a text or in a list, as the keys of a table, as a control that may have its
 # robot before it, or between braces in a message.
 Form = Literal["id", "keys", "control", "template"]
@@ -33,7 +35,11 @@ OWNERS: Final[Mapping[tuple[str, ...], Group]] = {
     ("page",): "page",
     ("page", "widget"): "widget",
     ("page", "group", "widget"): "widget",
+    ("page", "widget", "level"): "level",
+    ("page", "group", "widget", "level"): "level",
 }
+# Each table around them has ids of its own: a copy keeps them.
+LOCAL: Final[Set[Group]] = {"level"}
 ROLES: Final = ("access", "groups")  # a list of the names themselves
 
 # "table.key" → what it names; "*" is each table. A table is called as the JSON schema calls it.
@@ -61,6 +67,10 @@ REFERENCES: Final[Mapping[str, tuple[Form, tuple[Group, ...]]]] = {
     "readback.parameters": ("keys", ("widget",)),
     "readback.parameter_types": ("keys", ("widget",)),
     "confirm.equals": ("template", ("widget",)),
+    **{
+        f"{table}.level": ("id", ("level",))
+        for table in ("place", "zone", "zone_file", "layer", "plan", "routes")
+    },
     **{
         f"{table}.{key}": ("template", ("widget",))
         for table, keys in {

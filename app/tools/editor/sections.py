@@ -125,6 +125,11 @@ def header_text(keys: Keys, many: bool) -> str:
     return f"[[{name}]]" if many else f"[{name}]"
 
 
+def keys_of(path: Path) -> Keys:
+    """Those of the header of the table at a path."""
+    return tuple(step for step in path if isinstance(step, str))
+
+
 def is_list(keys: Keys) -> bool:
     return keys in LISTS
 

@@ -129,6 +129,7 @@ ack_input = "speed"
 needs = "fitters"
 [[place]]
 id = "dock"
+level = "ground"
 [[recipe]]
 id = "boxes"
 fields = ["speed"]
@@ -160,6 +161,8 @@ message = { x = "{x}", z = "{speed}" }
 [[page.widget]]
 id = "hall"
 kind = "map"
+level = [{ id = "ground" }]
+plan = { src = "x.svg", level = "ground" }
 [[page.widget]]
 id = "goal"
 kind = "place"
@@ -204,6 +207,7 @@ page = "cell"
         (("page", 0, "widget", 0), 8),
         (("page", 0, "widget", 1), 5),
         (("page", 0, "widget", 3), 1),
+        (("page", 0, "widget", 3, "level", 0), 2),
         (("page", 1, "group", 0, "widget", 0), 0),
     ],
 )
@@ -247,8 +251,8 @@ def test_braces_that_are_text_stay() -> None:
 def test_every_reference_of_the_panel_with_each_key_leads_to_a_table_or_to_a_name_of_the_file() -> None:
     tables = tomllib.loads((ROOT / "tests/everything.toml").read_text())
     taken = taken_ids(tables)
-    found = list(references(tables))
-    assert len({reference.form for reference, _ in found}) == 4
+    named = list(references(tables))
+    assert len({reference.form for reference, _ in named}) == 4
     assert len(list(owners(tables))) == sum(map(len, taken.values()))
 
 
