@@ -30,6 +30,7 @@ from app.tools.editor.document import (
     EditError,
     Insert,
     Move,
+    Paste,
     Rename,
     ReplaceText,
     SetValue,
@@ -199,6 +200,8 @@ class EditSession:
             match edit:
                 case Insert(path, value):
                     return Insert(_followed_place(before, now, path), value)
+                case Paste(path, text):
+                    return Paste(_followed_place(before, now, path), text)
                 case Move(path, to):
                     return Move(_followed_table(before, now, path), _followed_place(before, now, to))
                 case Duplicate(path, to):
