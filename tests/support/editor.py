@@ -3,7 +3,7 @@
 import os
 import signal
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -104,9 +104,13 @@ class EditorServer:
     def part(self, name: str, **query: str) -> str:
         return self.http.get(f"/parts/{name}", params=query).raise_for_status().text
 
+    def kill(self) -> None:
+        self.process.kill()
+
     def end(self) -> None:
         self.http.close()
-        self.process.send_signal(signal.SIGINT)
+        with suppress(ProcessLookupError):  # it was killed
+            self.process.send_signal(signal.SIGINT)
         command.finished(self.process)
 
 

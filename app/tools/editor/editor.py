@@ -1,56 +1,22 @@
 """What all browsers of one editor share: the document, what is wrong with it, and the preview."""
 
 import asyncio
-import os
-import shutil
+import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, Final
 
 from app.panel.file.toml_lines import Path
 from app.system.texts import TextLike, say
 from app.tools.editor.checked import NOT_CHECKED, Checked, DocumentChecker
-from app.tools.editor.document import Change, Document, Edit, EditError
+from app.tools.editor.document import Change, Document, Edit
+from app.tools.editor.merge import Side
 from app.tools.editor.paths import tag_of
 from app.tools.editor.preview import Preview
 from app.tools.editor.repairs import Repair
+from app.tools.editor.session import EditSession, SaveConflict
 
-
-class PanelFile:
-    """The file on disk, as the document was opened from it or saved to it."""
-
-    def __init__(self, path: FilePath) -> None:
-        """OSError if it can't be read, UnicodeDecodeError if it is not text."""
-        self.path = path
-        self._data = path.read_bytes()
-        self.document = Document(self._data.decode())
-
-    @property
-    def text(self) -> str:
-        return self._data.decode()
-
-    @property
-    def is_saved(self) -> bool:
-        return self.document.data == self._data
-
-    def save(self) -> None:
-        """Replaces the file; EditError if it is another one than was opened, or can't be written."""
-        data = self.document.data
-        beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
-        try:
-            if self.path.read_bytes() != self._data:
-                raise EditError(say("editor_changed_on_disk", file=self.path.name))
-            with beside.open("wb") as new:
-                new.write(data)
-                new.flush()
-                os.fsync(new.fileno())
-            shutil.copymode(self.path, beside)
-            beside.replace(self.path)
-        except OSError as error:
-            beside.unlink(missing_ok=True)
-            raise EditError(say("editor_not_saved", why=error.strerror or str(error))) from error
-        self._data = data
+WATCH_S: Final = 1.0
 
 
 @dataclass(eq=False)
@@ -66,10 +32,10 @@ class Editor:
     """What all browsers of one editor share. Used on the event loop only."""
 
     def __init__(
-        self, file: PanelFile, preview: Preview, checker: DocumentChecker, language: str = ""
+        self, session: EditSession, preview: Preview, checker: DocumentChecker, language: str = ""
     ) -> None:
         """`language` is that of the editor's pages; "" for that of each browser."""
-        self.file = file
+        self.session = session
         self.changes = 0  # since it was saved
         self.preview = preview
         self.language = language
@@ -81,25 +47,63 @@ class Editor:
 
     @property
     def document(self) -> Document:
-        return self.file.document
+        return self.session.document
 
-    def apply(self, edits: Iterable[Edit], label: str) -> Change:
-        """One step; EditError if an edit can't be made."""
-        return self._changed(self.document.apply(edits, label), 1)
+    def apply(
+        self, edits: Iterable[Edit], label: str, revision: int | None = None, author: str = ""
+    ) -> Change:
+        """One step; EditError if an edit can't be made, EditBehind if it is of an older revision and
+        its table has changed since."""
+        return self._changed(self.session.apply(edits, label, revision=revision, author=author), 1)
 
-    def undo(self) -> Change:
+    def undo(self, author: str = "") -> Change:
         """EditError if nothing was done."""
-        return self._changed(self.document.undo(), -1)
+        return self._changed(self.session.undo(author), -1)
 
-    def redo(self) -> Change:
+    def redo(self, author: str = "") -> Change:
         """EditError if nothing was taken back."""
-        return self._changed(self.document.redo(), 1)
+        return self._changed(self.session.redo(author), 1)
 
-    def save(self) -> None:
-        """EditError if the file on disk is another one by now, or can't be written."""
-        self.file.save()
+    def save(self, author: str = "") -> TextLike:
+        """Saves, with the changes that others have made in the file, and returns what went wrong
+        beside that; SaveConflict if both have changed a table, SessionError if it can't be written."""
+        revision = self.document.revision
+        try:
+            saved = self.session.save(author=author)
+        finally:
+            self.notify()
         self.changes = 0
+        if self.document.revision != revision:
+            self.show()
+        return saved.problem
+
+    def resolve(self, name: str, choice: Side | tuple[str]) -> None:
+        """Chooses a side of a conflict with the file on the disk, or another text in a tuple."""
+        self.session.resolve(name, choice)
         self.notify()
+
+    def take_recovered(self, author: str = "") -> Change:
+        """Goes on with what was not saved when the editor ended."""
+        return self._changed(self.session.take_recovered(author), 1)
+
+    def drop_recovered(self) -> None:
+        self.session.drop_recovered()
+        self.notify()
+
+    async def watch(self) -> None:
+        """Takes what others write into the file, for ever; what both have changed waits for Save."""
+        while True:
+            await asyncio.sleep(WATCH_S)
+            has_conflicts = bool(self.session.conflicts)
+            if self.session.disk_state != "changed" or has_conflicts:
+                continue
+            revision = self.document.revision
+            with contextlib.suppress(SaveConflict):
+                self.session.merge_from_disk()
+            if self.document.revision != revision:
+                self.show()
+            else:
+                self.notify()
 
     def _changed(self, change: Change, number: int) -> Change:
         self.changes += number
@@ -133,7 +137,8 @@ class Editor:
 
     def state(self, name: str) -> dict[str, Any]:
         """What a browser shows outside its panes."""
-        is_saved, document, changes = self.file.is_saved, self.document, abs(self.changes)
+        session, document, changes = self.session, self.document, max(1, abs(self.changes))
+        is_saved = not session.unsaved
         status: TextLike = say("editor_saved")
         if not is_saved:
             status = say("editor_change" if changes == 1 else "editor_changes", number=changes)
@@ -146,6 +151,9 @@ class Editor:
             "undo": document.undo_label is not None,
             "redo": document.redo_label is not None,
             "faults": len(self.checked.faults),
+            "conflicts": len(session.conflicts),
+            "recovered": session.recovered is not None,
+            "warning": session.journal_problem,
             "others": [
                 {
                     "number": other.number,

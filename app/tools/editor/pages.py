@@ -12,6 +12,7 @@ from app.system.texts.locales import own_name
 from app.tools.editor.document import DiffLine
 from app.tools.editor.editor import Editor, Part, PartRequest
 from app.tools.editor.forms import FormPage, Link, form_context, form_of, table_path
+from app.tools.editor.merge_page import merge_page, recovered_page
 from app.tools.editor.outline import outline
 from app.tools.editor.paths import (
     at,
@@ -58,7 +59,7 @@ WORDS: Final = {
     "faults": say("editor_faults"),
     "diff": say("editor_diff"),
     "pages_of_panel": say("editor_pages_of_panel"),
-    "behind": say("editor_behind"),
+    "conflict": say("editor_conflict"),
     "lost": say("editor_lost"),
 }
 
@@ -78,7 +79,7 @@ def page_context(editor: Editor, language: str, revision: str) -> dict[str, Any]
         languages = [*panel.readers_languages]
     return {
         "revision": revision,
-        "file": editor.file.path.name,
+        "file": editor.session.path.name,
         "sizes": SIZES,
         "languages": [(tag, own_name(tag)) for tag in languages],
         "shown_language": panel.language if panel is not None else languages[0],
@@ -179,7 +180,7 @@ def _fault_row(remark: Remark, is_fault: bool, tables: Mapping[str, Any]) -> Fau
 def _diff(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     document = request.editor.document
     total = document.text.count("\n")
-    lines = _with_gaps(document.diff(request.editor.file.text), total)
+    lines = _with_gaps(document.diff(request.editor.session.base_text), total)
     new = sum(1 for kind, _, _ in lines if kind in ("added", "removed"))
     return "_diff.html", {
         "lines": lines if new else (),
@@ -295,4 +296,6 @@ PARTS: Final[Mapping[str, Part]] = {
     "delete": _delete,
     "robot": _robot,
     "parts": _kinds,
+    "merge": merge_page,
+    "recovered": recovered_page,
 }

@@ -17,18 +17,21 @@ from starlette.requests import cookie_parser
 from starlette.routing import Mount
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from app.system.concurrency import keep_running
 from app.system.errors import KioskError, NotFound
 from app.system.settings import Settings, shipped_path
 from app.system.texts import localized, say
 from app.tools.editor import uploads
 from app.tools.editor.checked import DocumentChecker
 from app.tools.editor.document import Change, EditError, edit_from, path_from
-from app.tools.editor.editor import Browser, Editor, PanelFile, PartRequest
+from app.tools.editor.editor import Browser, Editor, PartRequest
+from app.tools.editor.merge import Side
 from app.tools.editor.pages import PARTS, page_context, place_list
 from app.tools.editor.pasting import paste
 from app.tools.editor.paths import path_of
 from app.tools.editor.preview import ROOT as PREVIEW
 from app.tools.editor.preview import Preview
+from app.tools.editor.session import EditSession
 from app.web.asgi import Application
 from app.web.assets import FONTS, Asset, asset
 from app.web.language import MOST_ACCEPTED, negotiated
@@ -38,6 +41,7 @@ from app.web.security import POLICY, RequestGuard, content_security_policy, refu
 log = logging.getLogger("kiosk.editor")
 
 COOKIE: Final = "panel_editor"
+CONFLICT: Final = 409
 TOKEN: Final = "token"  # in the query of the printed address
 LANGUAGES: Final = ("en", "ja", "de")
 BEAT_S: Final = 15.0
@@ -66,6 +70,20 @@ class Pasted(BaseModel):
     label: str = ""
 
 
+class Choice(BaseModel):
+    """What a conflict with the file on the disk becomes: a side, or a `text`."""
+
+    name: str
+    side: Side = "ours"
+    text: str | None = None
+
+
+class Recovery(BaseModel):
+    """Whether to go on with what was not saved."""
+
+    take: bool
+
+
 class Selected(BaseModel):
     browser: str
     path: list[str | int] | None = None
@@ -91,15 +109,19 @@ def editor_app(
     """The application of the editor of one file. Only browsers with the token, which the address has
     once, are let in."""
     preview = Preview(path, settings, is_live)
-    editor = Editor(PanelFile(path), preview, DocumentChecker(path), language)
+    session = EditSession(path)
+    editor = Editor(session, preview, DocumentChecker(path), language)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         await preview.start()
         editor.show()
+        watching = keep_running(editor.watch, log, "watching the file failed")
         try:
             yield
         finally:
+            watching.cancel()
+            session.close()
             await preview.stop()
 
     app = Application(
@@ -178,6 +200,8 @@ async def _on_error(request: Request, error: Exception) -> Response:
     status = error.status if isinstance(error, KioskError) else 500
     message = error.text if isinstance(error, KioskError) else str(error)
     answer: dict[str, Any] = {"message": message}
+    if status == CONFLICT:
+        answer |= _editor_of(request).state("")
     if isinstance(error, EditError):
         answer["path"] = error.path
     return _json(request, answer, status)
@@ -241,9 +265,8 @@ def _add_routes(app: FastAPI) -> None:
 
     @app.post("/edits")
     async def edit(posted: Edits, request: Request, editor: CurrentEditor) -> Response:
-        if posted.revision != editor.document.revision:
-            return _json(request, {"message": say("editor_behind"), **editor.state("")}, 409)
-        return _step(request, editor, lambda: editor.apply(map(edit_from, posted.edits), posted.label))
+        edits = [*map(edit_from, posted.edits)]
+        return _step(request, editor, lambda: editor.apply(edits, posted.label, posted.revision))
 
     @app.post("/paste")
     async def paste_text(posted: Pasted, request: Request, editor: CurrentEditor) -> Response:
@@ -269,7 +292,20 @@ def _add_routes(app: FastAPI) -> None:
 
     @app.post("/save")
     async def save(request: Request, editor: CurrentEditor) -> Response:
-        editor.save()
+        problem = editor.save()
+        return _json(request, editor.state("") | ({"message": problem} if problem else {}))
+
+    @app.post("/resolve")
+    async def resolve(choice: Choice, request: Request, editor: CurrentEditor) -> Response:
+        side = (choice.text,) if choice.text is not None else choice.side
+        editor.resolve(choice.name, side)
+        return _json(request, editor.state(""))
+
+    @app.post("/recovered")
+    async def recovered(choice: Recovery, request: Request, editor: CurrentEditor) -> Response:
+        if choice.take:
+            return _step(request, editor, editor.take_recovered)
+        editor.drop_recovered()
         return _json(request, editor.state(""))
 
     @app.get("/places")

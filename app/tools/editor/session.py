@@ -212,6 +212,8 @@ class EditSession:
                     return Delete(_followed_table(before, now, path))
                 case ReplaceText(path, text):
                     return ReplaceText(_followed_table(before, now, path), text)
+                case Paste(path, text):
+                    return Paste(_followed_place(before, now, path), text)
                 case Rename(path, name):
                     return Rename(_followed_key(before, now, path), name)
                 case SetValue(path, value):

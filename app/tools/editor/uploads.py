@@ -30,7 +30,7 @@ def store(editor: Editor, path: Path, name: str, data: bytes) -> Change:
         raise InputError(
             say("form_file_name" if len(data) <= MOST_BYTES else "form_file_large", name=name)
         )
-    folder = editor.file.path.parent
+    folder = editor.session.path.parent
     edits: list[Edit] = []
     if is_picture:
         named = editor.document.tables.get(PICTURES)
@@ -51,7 +51,7 @@ def store(editor: Editor, path: Path, name: str, data: bytes) -> Change:
         trial = Document(editor.document.text)
         trial.apply(edits, "")
         place = place_of(path)
-        for fault in faults_of_text(trial.text, editor.file.path.parent):
+        for fault in faults_of_text(trial.text, editor.session.path.parent):
             if fault.place == place or fault.place == PICTURES:
                 raise InputError(fault.message)
     except (InputError, OSError) as error:

@@ -1,6 +1,7 @@
 // Starts the editor's page: its header, its keys and its panes.
 import * as arrange from "./arrange.js";
 import * as change from "./change.js";
+import * as merge from "./merge.js";
 import * as outline from "./outline.js";
 import * as panes from "./panes.js";
 import * as preview from "./preview.js";
@@ -44,6 +45,7 @@ for (const [name, choose] of Object.entries(CHOICES)) {
 async function take(name) {
   const answer = await step(name);
   if (answer?.select) select(answer.select, "edit");
+  if (name === "save") merge.openMerge();
 }
 for (const name of /** @type {const} */ (["undo", "redo", "save"]))
   get(name).addEventListener("click", () => take(name));
@@ -118,4 +120,5 @@ outline.start();
 preview.start();
 arrange.start();
 change.start();
+merge.start();
 open();

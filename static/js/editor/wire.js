@@ -12,6 +12,9 @@
  * @property {boolean} undo
  * @property {boolean} redo
  * @property {number} faults
+ * @property {number} conflicts With the file on the disk.
+ * @property {boolean} recovered Whether there is work that was not saved.
+ * @property {string} warning
  * @property {OtherBrowser[]} others
  */
 /** @typedef {{ op: string, path: Path, value?: unknown, toml?: string, to?: Path, id?: string, text?: string }} Edit */
@@ -35,6 +38,9 @@ export let state = {
   undo: false,
   redo: false,
   faults: 0,
+  conflicts: 0,
+  recovered: false,
+  warning: "",
   others: [],
 };
 
@@ -138,6 +144,12 @@ export function upload(path, file) {
 /** @param {Edit[]} edits @param {string} [label] */
 export function edit(edits, label = "") {
   return inTurn(() => post("/edits", { revision: state.revision, edits, label }));
+}
+
+// Chooses what a conflict, or work that was not saved, becomes.
+/** @param {"/resolve" | "/recovered"} path @param {Record<string, unknown>} choice */
+export function postChoice(path, choice) {
+  return inTurn(() => post(path, choice));
 }
 
 // Pastes a table by its text, after the table at `path` or at its end.

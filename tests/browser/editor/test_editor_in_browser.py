@@ -272,6 +272,20 @@ def test_the_only_repair_of_a_fault_is_a_press_away(desk: Page, editor: EditorSe
     assert editor.http.get("/text").text == PANEL
 
 
+def test_a_conflict_with_the_disk_is_chosen_and_saved(desk: Page, editor: EditorServer) -> None:
+    editor.edit({"op": "set", "path": [*SPEED, "label"], "value": "Belt speed"}).raise_for_status()
+    editor.file.write_text(PANEL.replace('label = "Speed"', 'label = "Velocity"'))
+    desk.locator("#save").click()
+    expect(desk.locator("#merge .conflict")).to_be_visible()
+    expect(desk.locator("#conflict")).to_be_visible()
+    desk.evaluate(AXE)
+    assert desk.evaluate(RUN, {"values": ALL, "type": "tag"}) == []
+    desk.locator("#merge").get_by_role("button", name="Yours").click()
+    expect(desk.locator("#status")).to_have_text("Saved")
+    expect(desk.locator("#merge")).to_be_hidden()
+    assert 'label = "Belt speed"' in editor.file.read_text()
+
+
 def test_two_browsers_see_one_document(desk: Page, editor: EditorServer, chromium: Browser) -> None:
     with chromium.new_context(viewport={"width": 1280, "height": 800}, locale="ja") as context:
         other = context.new_page()

@@ -84,13 +84,16 @@ def test_an_edit_is_a_step_with_a_new_revision(editor: EditorServer) -> None:
     assert editor.http.post("/redo", json={}).status_code == 422
 
 
-def test_an_edit_of_an_older_revision_gets_the_newest(editor: EditorServer) -> None:
+def test_an_edit_of_an_older_revision_follows_its_table(editor: EditorServer) -> None:
     known = editor.state()["revision"]
+    moved = {"op": "move", "path": LABEL[:-1], "to": [*LABEL[:-2], 1]}
+    assert editor.edit(moved, revision=known).status_code == 200
     edit = {"op": "set", "path": LABEL, "value": "Belt speed"}
     assert editor.edit(edit, revision=known).status_code == 200
-    behind = editor.edit(edit, revision=known)
+    assert editor.http.get("/text").text.count('label = "Belt speed"') == 1
+    behind = editor.edit({**edit, "value": "Speed of the belt"}, revision=known)
     assert behind.status_code == 409
-    assert behind.json()["revision"] == known + 1
+    assert behind.json()["revision"] == known + 2
 
 
 def test_an_edit_that_can_not_be_made_names_its_path(editor: EditorServer) -> None:
@@ -115,13 +118,42 @@ def test_save_writes_the_changed_line_only(editor: EditorServer) -> None:
     assert "−" not in editor.part("diff")
 
 
-def test_a_file_that_changed_on_disk_is_not_overwritten(editor: EditorServer) -> None:
+def test_what_others_write_is_merged_where_it_is_another_table(editor: EditorServer) -> None:
     editor.edit({"op": "set", "path": LABEL, "value": "Belt speed"}).raise_for_status()
-    by_another = PANEL.replace("Gripper", "Claw")
+    editor.file.write_text(PANEL.replace("Gripper", "Claw"))
+    until(lambda: "Claw" in editor.http.get("/text").text, "it is taken")
+    editor.http.post("/save", json={}).raise_for_status()
+    both = PANEL.replace("Gripper", "Claw").replace('label = "Speed" ', 'label = "Belt speed" ')
+    assert editor.file.read_text() == both
+
+
+def test_what_both_have_changed_is_chosen(editor: EditorServer) -> None:
+    editor.edit({"op": "set", "path": LABEL, "value": "Belt speed"}).raise_for_status()
+    by_another = PANEL.replace('label = "Speed"', 'label = "Velocity"')
     editor.file.write_text(by_another)
-    assert editor.http.post("/save", json={}).status_code == 422
+    assert editor.http.post("/save", json={}).status_code == 409
     assert editor.file.read_text() == by_another
-    editor.file.write_text(PANEL)
+    assert editor.state()["conflicts"] == 1
+    page = editor.part("merge")
+    assert "Belt speed" in page
+    assert "Velocity" in page
+    name = page.partition('data-conflict="')[2].partition('"')[0]
+    editor.http.post("/resolve", json={"name": name, "side": "theirs"}).raise_for_status()
+    editor.http.post("/save", json={}).raise_for_status()
+    assert editor.file.read_text() == by_another
+    assert editor.part("merge").strip() == ""
+
+
+def test_unsaved_work_is_there_again_after_a_crash(tmp_path: Path) -> None:
+    with editing(tmp_path) as first:
+        first.edit({"op": "set", "path": LABEL, "value": "Belt speed"}).raise_for_status()
+        first.kill()
+    with editing(tmp_path) as second:
+        assert second.state()["recovered"]
+        assert "Belt speed" in second.part("recovered")
+        second.http.post("/recovered", json={"take": True}).raise_for_status()
+        assert "Belt speed" in second.http.get("/text").text
+        assert not second.state()["recovered"]
 
 
 def test_a_page_is_drawn_with_the_edit_before_its_sessions_run(editor: EditorServer) -> None:
@@ -211,7 +243,10 @@ def test_a_press_in_the_preview_reaches_the_simulated_robot(editor: EditorServer
 
 
 def test_nothing_is_written_beside_the_file(editor: EditorServer) -> None:
-    assert [file.name for file in editor.file.parent.iterdir()] == ["cell.toml"]
+    assert {file.name for file in editor.file.parent.iterdir()} == {"cell.toml", "state"}
+    assert [folder.name for folder in (editor.file.parent / "state/operator-panel").iterdir()] == [
+        "editor"
+    ]
 
 
 def test_a_live_preview_sends_nothing(tmp_path: Path) -> None:
