@@ -98,6 +98,7 @@ EXACT: Final = 2.0**53  # the limit of every number in a browser; no limit that 
 LONG: Final = 200  # characters of a text from which on a field has several lines
 FEW: Final = 4  # choices that stand side by side, if they are short
 SHORT: Final = 8
+PRIORITY: Final = 3  # of an alarm that says nothing
 MOST_PATHS: Final = 400  # completed paths of a message
 DEEP: Final = 5  # steps of a completed path
 MESSAGES: Final = frozenset(  # keys with the fields of what is sent
@@ -109,14 +110,15 @@ MESSAGES: Final = frozenset(  # keys with the fields of what is sent
 LINK: Final = re.compile(r"\[([^\]]*)\]\([^)]*\)")  # of Markdown
 # Texts that would be read as something else without quotes.
 PLAIN: Final = re.compile(r"""(true|false|[-+]?\.?[0-9].*|["'\[].*|\{[^=]*=.*|\{\s*\}|)""", re.DOTALL)
-WIDTHS: Final = {3: "¼", 6: "½", 9: "¾", 12: ""}  # of twelve columns; 12 is said in words
+TWELFTHS: Final = 12  # columns of a group that says nothing
+PARTS: Final = {4: "¼", 2: "½", 1: ""}  # of a row; the whole is said in words
 
 
 WORDS: Final = {
     "unset": say("form_unset"),
     "none": say("form_none"),
     "missing": say("form_missing"),
-    "copy": say("form_copy_text"),
+    "copy_text": say("form_copy_text"),
     "choose": say("form_choose"),
     "upload": say("form_upload"),
     "add": say("form_add"),
@@ -420,9 +422,17 @@ def table_path(tables: Tables, path: Path) -> Path:
                 name = table_at(tables, path[:end])
             except NoTableError:
                 continue
-            if isinstance(value, dict) or (name in OPENED and isinstance(path[end - 1], str)):
+            step = path[end - 1]
+            is_single = name in OPENED and isinstance(step, str) and not _is_list(tables, path[:end])
+            if isinstance(value, dict) or is_single:
                 return path[:end]
     return ()
+
+
+def _is_list(tables: Tables, path: Path) -> bool:
+    """Whether the key at a path has a list of tables."""
+    prop = schema()[table_at(tables, path[:-1])]["properties"].get(path[-1], {})
+    return bool(prop.get("type") == "array")
 
 
 def table_at(tables: Tables, path: Path) -> str:
@@ -493,7 +503,7 @@ def tabs_of(
         ]
         return (*reversed(tabs), Tab(table_name(ROOT), ()))
     own = Tab(table_name(str(_last_name(path))), path, chosen=view == "form")
-    used = () if used_by is None else (Tab(say("form_used_by", number=used_by), path, "used"),)
+    used = () if not used_by else (Tab(say("form_used_by", number=used_by), path, "used"),)
     shown = (own, *used, Tab(say("form_as_text"), path, "text"))
     return tuple(replace(tab, chosen=tab.view == view) for tab in shown)
 
@@ -669,6 +679,8 @@ class _Maker:
             rows = [*_paired(shown, fields, BESIDE_BY_TABLE.get(name, BESIDE))]
             if rule.title == "form_section_place" and "widget" in path[-2:]:
                 rows = [*self._place(path), *rows]
+            if rule.title == "form_section_people" and (alarms := self._alarms(path, table)):
+                rows = [alarms, *rows]
             if rows:
                 note = self._live(table) if not rule.keys else self._languages_of(rows)
                 yield FormSection(say(rule.title), tuple(rows), note, rule.title)
@@ -677,6 +689,19 @@ class _Maker:
         if folded:
             title = say("form_more_keys", number=len(folded))
             yield FormSection(title, tuple(folded), folded=True)
+
+    def _alarms(self, path: Path, table: Mapping[str, Any]) -> Field | None:
+        """The alarms of the value that a widget shows."""
+        links = []
+        for number, alarm in enumerate(list_of(self.tables.get("alarm"))):
+            names = [key for key in ("topic", "source") if key in table and key in alarm]
+            if any(alarm[key] == table[key] for key in names) and "widget" in path[-2:]:
+                code = PRIORITIES.get(alarm.get("priority", PRIORITY))
+                links.append(Link(("alarm", number), title_of(alarm), say(code) if code else ""))
+        if not links:
+            return None
+        name = table_name("alarm")
+        return Field((*path, "alarm"), name, "opened", raw=links, links=tuple(links))
 
     def _live(self, table: Mapping[str, Any]) -> TextLike:
         """The newest value of what the table reads."""
@@ -828,7 +853,7 @@ class _Maker:
             return _choices(path, value, [*usual, *([value] if value not in (None, *usual) else ())])
         if key in ("colour",) and "enum" in prop:
             return _choices(path, value, prop["enum"])
-        if key == "span" and "columns" not in self._around(path):
+        if key == "span" and "widget" in path[-3:]:
             return self._width(path, value)
         return self._plain(path, name, table, prop)
 
@@ -980,7 +1005,7 @@ class _Maker:
         """A text in the languages of the panel."""
         if not isinstance(value, dict):
             shown = plain(value) if isinstance(value, str | None) else _literal(value)
-            if len(self.languages) < 2 or not isinstance(value, str | None):
+            if len(self.languages) < 2 or not isinstance(value, str):
                 single = TextIn("", "", path, shown, missing=False)
                 return Field(path, "", "texts", value=shown, texts=(single,))
             own_tag = str(self.tables.get("language", ENGLISH))
@@ -1045,9 +1070,13 @@ class _Maker:
         return value if isinstance(value, dict) else {}
 
     def _width(self, path: Path, value: Any) -> Field:
+        """The width in columns, and parts of the row as buttons."""
+        columns = self._around(path).get("columns", TWELFTHS)
+        parts = PARTS.items() if isinstance(columns, int) else ()
         choices = [
-            Choice(span, text or say("form_whole_width"), span == value)
-            for span, text in WIDTHS.items()
+            Choice(columns // part, text or say("form_whole_width"), columns // part == value)
+            for part, text in parts
+            if columns % part == 0
         ]
         return Field(path, "", "number", value=_shown(value), choices=tuple(choices))
 
@@ -1115,8 +1144,8 @@ class _Maker:
                 add = Act(say("form_add_table", name=table_name(key)), "plus", (begin,))
                 return Field(path, "", "opened", acts=(add,))
             remove = Act(say("form_remove"), "x", ({"op": "delete", "path": [*path]},))
-            link = Link(path, "", say("form_keys_there", number=len(value)))
-            return Field(path, "", "opened", links=(link,), acts=(remove,))
+            link = Link(path, "", say("form_keys_there", number=len(value)), (remove,))
+            return Field(path, "", "opened", links=(link,))
         listed = value if isinstance(value, list) else []
         links = []
         for number, table in enumerate(listed):
@@ -1284,6 +1313,8 @@ def _is_short(each: Field) -> bool:
 def _is_shown(each: Field) -> bool:
     if each.of_ids and not each.choices:
         return each.is_set or each.required
+    if each.control == "fields" and each.key in MESSAGES and not each.choices:
+        return each.is_set or each.required or bool(each.faults)
     return each.is_set or each.required or bool(each.faults) or each.key in COMMON
 
 

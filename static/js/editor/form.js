@@ -189,12 +189,15 @@ export class Form {
       if (there instanceof HTMLDetailsElement && this.#pane.contains(there))
         details.toggleAttribute("open", there.open);
     }
+    const hadFocus = this.#pane.contains(document.activeElement);
     const kept = { skips: (/** @type {Element} */ node) => isEntry(node) && this.#isTyped(node), stays: isRefusal };
     updateInPlace(this.#pane, fresh, kept);
     for (const entry of this.#entries()) if (!this.#isTyped(entry)) reset(entry);
     for (const box of /** @type {NodeListOf<HTMLInputElement>} */ (this.#pane.querySelectorAll("[type=checkbox]")))
       box.checked = box.defaultChecked;
     for (const entry of this.#refused) if (!entry.isConnected) this.#refused.delete(entry);
+    if (hadFocus && document.activeElement === document.body)
+      /** @type {HTMLElement | null} */ (this.#pane.querySelector(".form :is(input, select, button)"))?.focus();
   }
 
   /** @returns {Entry[]} */
@@ -260,7 +263,7 @@ export class Form {
       }
       if (posted.ok) forgive(at);
       else refuse(at, posted.message ?? "");
-      if (posted.ok && isEntry(at) && at.value === sent) settle(at);
+      if (posted.ok && isEntry(at) && at.value === sent && !at.hasAttribute("data-by-edits")) settle(at);
       if (isEntry(at) && this.#sent.get(at) === sent) this.#sent.delete(at);
       await this.refresh();
       return posted.ok;
@@ -388,8 +391,9 @@ function reset(entry) {
 // What was posted is what the server has: the next refresh may change it.
 /** @param {Entry} entry */
 function settle(entry) {
-  if (entry instanceof HTMLSelectElement) return;
-  if (entry.dataset.sends === "key") entry.value = entry.defaultValue;
+  if (entry instanceof HTMLSelectElement) {
+    for (const option of entry.options) option.defaultSelected = option.selected;
+  } else if (entry.dataset.sends === "key") entry.value = entry.defaultValue;
   else entry.defaultValue = entry.value;
 }
 

@@ -97,7 +97,7 @@ def test_a_missing_language_is_named_typed_and_copied(show: Show) -> None:
     german = form.page.locator("input[lang=de]").first
     expect(german).to_have_attribute("placeholder", "missing")
     expect(form.page.get_by_text("Deutsch is a language of this panel.")).to_be_visible()
-    form.page.get_by_role("button", name="copy").click()
+    form.page.get_by_role("button", name="copy", exact=True).click()
     until(lambda: form.saved["page"][0]["widget"][0]["label"].get("de") == "Count", "it is copied")
     expect(form.page.get_by_text("Deutsch is a language of this panel.")).to_have_count(0)
     german.fill("Kartons")

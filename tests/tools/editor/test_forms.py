@@ -338,3 +338,23 @@ def test_a_widget_moves_to_another_group_and_a_row_up_and_down() -> None:
 def test_a_copy_of_a_widget_has_only_its_place() -> None:
     number = next(n for n, w in enumerate(TABLES["page"][2]["widget"]) if SAME in w)
     assert set(fields(form_of(TABLES, ("page", 2, "widget", number)))) >= {SAME, "span", "rows", "grow"}
+
+
+def test_a_widget_names_the_alarms_of_its_value() -> None:
+    text = PANEL_OF_TWO + '\n[[alarm]]\nid = "full"\ntopic = "/boxes"\npriority = 2\n'
+    form = form_of(tomllib.loads(text), ("page", 0, "widget", 0))
+    alarms = next(field for field in form.fields if field.links and field.key == "alarm")
+    assert [(link.path, link.text, str(link.note)) for link in alarms.links] == [
+        (("alarm", 0), "full", "Medium")
+    ]
+
+
+def test_the_width_is_chosen_in_parts_of_the_groups_columns() -> None:
+    known = fields(form_of(TABLES, ("page", 1, "group", 0, "widget", 0)))
+    assert [choice.value for choice in known["span"].choices] == [3]  # of three columns only the whole
+    known = fields(form_of(TABLES, ("page", 0, "widget", 0)))
+    assert [(choice.value, choice.chosen) for choice in known["span"].choices] == [
+        (3, False),
+        (6, True),
+        (12, False),
+    ]
