@@ -359,15 +359,25 @@ class Document:
         return diff_lines(against.removeprefix(BOM), self.text)
 
 
-def _opened(text: str, previous: Tables) -> State:
+def _opened(text: str, previous: Tables, known: Iterable[Section] = ()) -> State:
+    """The state of a text. Sections that are among the known ones are the same objects."""
+    by_text: dict[str, list[Section]] = {}
+    for section in reversed([*known]):
+        by_text.setdefault(section.text, []).append(section)
     try:
         tables = parse_toml(FilePath("panel.toml"), text.encode()).tables
-        sections = tuple(split(text, tables))
+        new = split(text, tables)
+        sections = tuple(_known(section, by_text) for section in new)
         paths = tuple(paths_of(sections))
     except PanelError as error:
         raw = Section("", "", text, "", (), False, 0, {})
         return State((raw,), ((),), {}, error.faults[0])
     return State(sections, paths, assembled(sections, previous))
+
+
+def _known(section: Section, by_text: Mapping[str, list[Section]]) -> Section:
+    same = by_text.get(section.text)
+    return same.pop() if same and same[-1].keys == section.keys else section
 
 
 def _value(tables: Any, path: Path) -> Any:
@@ -812,7 +822,7 @@ class Draft:
                 raise EditError(say("edit_other_key", place=place_of(path)), path)
 
     def _replace_file(self, text: str) -> None:
-        opened = _opened(text.removeprefix(BOM), self._last)
+        opened = _opened(text.removeprefix(BOM), self._last, self.sections)
         if opened.unreadable and not self._unreadable:
             raise EditError(say("edit_not_toml", reason=str(opened.unreadable)))
         self.sections, self.paths = list(opened.sections), list(opened.paths)

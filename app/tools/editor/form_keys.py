@@ -345,6 +345,13 @@ def _maps(tables: Tables) -> Iterator[Named]:
             yield Named(table["id"], plain(table.get("label")))
 
 
+def _levels(tables: Tables) -> Iterator[Named]:
+    for _, table in widgets(tables):
+        for level in list_of(table.get("level")):
+            if isinstance(level.get("id"), str):
+                yield Named(level["id"], plain(level.get("label")))
+
+
 def _roles(tables: Tables) -> Iterator[Named]:
     yield from (Named(role, say(ROLE_NAMES[role])) for role in ROLES)
     access = tables.get("access")
@@ -363,7 +370,7 @@ def _words_of_the_state(tables: Tables) -> Iterator[Named]:
         yield Named(str(row.get("value", "")), plain(row.get("text")))
 
 
-# By "table.key", or by the key alone; "" leaves a key out.
+# What a form offers, by "table.key", or by the key alone; `references.py` has each key with ids.
 REFERENCES: Final[Mapping[str, Names]] = {
     "interlock": _listed("interlock"),
     "condition": _listed("interlock", "condition"),
@@ -384,6 +391,9 @@ REFERENCES: Final[Mapping[str, Names]] = {
     "alarm_line.group": _alarm_groups,
     "same": _widgets_of(object),
     "needs": _roles,
+    **{
+        f"{table}.level": _levels for table in ("place", "zone", "zone_file", "layer", "plan", "routes")
+    },
 }
 
 

@@ -92,7 +92,7 @@ class Recovered:
 
 @dataclass(frozen=True, slots=True)
 class HistoryEntry:
-    """Who has made which change, and the tables before it."""
+    """Who has made which change."""
 
     change: Change
     author: str
@@ -233,9 +233,10 @@ class EditSession:
             )
         ]
         entry = (near or later)[-1]
-        return say(
-            "edit_behind", place=place_of(path), author=entry.author or "?", label=entry.change.label
-        )
+        place, label = place_of(path), entry.change.label
+        if entry.author:
+            return say("edit_behind", place=place, author=entry.author, label=label)
+        return say("edit_changed_since", place=place, label=label)
 
     # disk
 

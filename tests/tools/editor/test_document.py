@@ -701,6 +701,8 @@ def test_tables_beside_an_edit_are_the_same_objects() -> None:
     document.apply([SetValue(("page", 2, "group", 0, "widget", 1, "label"), "x")], "set")
     document.apply([Delete(("page", 2, "group", 0, "widget", 0))], "delete")
     document.apply([Insert(("page", 0), {"id": "new", "title": "New"})], "insert")
+    text = document.text.replace('title = "New"', 'title = "Newer"')
+    document.apply([ReplaceText((), text)], "as text")
     after = document.tables
     assert after["interlock"] is before["interlock"]
     same = [any(page is each for each in before["page"]) for page in after["page"]]

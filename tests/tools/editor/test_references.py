@@ -9,6 +9,7 @@ import pytest
 from app.panel.base import ID
 from app.panel.reference.schema import WIDGET, kinds_of, models, panel_schema
 from app.panel.template import placeholders
+from app.tools.editor import form_keys
 from app.tools.editor.document import Document, Rename
 from app.tools.editor.references import (
     FREE_FORM,
@@ -94,6 +95,11 @@ def test_the_table_has_only_keys_of_the_panel_file() -> None:
     known = {f"{name}.{key}" for name, table in TABLES.items() for key in table["properties"]}
     known |= {f"*.{key}" for _, key, _ in keys()}
     assert REFERENCES.keys() - known == set()
+
+
+def test_a_form_offers_the_ids_of_each_such_key() -> None:
+    by_text = [row.split(".") for row, (form, _) in REFERENCES.items() if form in ("id", "control")]
+    assert [key for table, key in by_text if form_keys.references(table, key) is None] == []
 
 
 def test_each_table_with_an_id_is_known() -> None:

@@ -454,6 +454,14 @@ def test_an_edit_of_an_older_revision_follows_its_table_or_is_refused(
         assert session.document.tables == tomllib.loads(session.document.text)
 
 
+def test_a_change_without_an_author_is_named_too(file: Path, opened: Open) -> None:
+    session = opened(file)
+    session.apply([GO], "go")
+    with pytest.raises(EditBehind) as refused:
+        session.apply([SetValue((*START, "label"), "Los")], "los", revision=0)
+    assert code(refused) == "edit_changed_since"
+
+
 def test_a_revision_that_is_forgotten_is_refused(file: Path, opened: Open) -> None:
     session = opened(file)
     session.apply([GO], "go")
