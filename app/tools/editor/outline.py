@@ -6,6 +6,7 @@ from typing import Any, Final, NamedTuple
 from app.panel.file.toml_lines import Path
 from app.system.icons import icons
 from app.system.texts import TextLike, say
+from app.system.texts.catalogue import files
 from app.tools.editor.paths import Tables, title_of
 
 # The tables in the order of a panel's parts, each with its icon; others follow as they are in the file.
@@ -36,6 +37,7 @@ KINDS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("map",), "map"),
     **dict.fromkeys(("log",), "history"),
 }
+LANGUAGES: Final = frozenset(files())
 ANY_ICON: Final = "circle-dot"
 
 
@@ -56,7 +58,7 @@ def outline(tables: Tables, language: str) -> Iterator[Node]:
     names = [*SECTIONS, *(key for key in tables if key not in SECTIONS)]
     for name in names:
         value = tables.get(name)
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and not value.keys() <= LANGUAGES:  # a text in some languages
             word, icon = SECTIONS.get(name, ("", ANY_ICON))
             inside = [*_inside(value, (name,), 2, language)] if name in ("frame",) else []
             yield Node((name,), 1, _known(icon), say(word) if word else name, "", _own(inside, 2))

@@ -1,5 +1,6 @@
 """The editor's page and its panes: what their templates are rendered with."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -40,6 +41,8 @@ LEFT_WORDS: Final = {
     "parts": "editor_tab_parts",
 }
 
+_FITS: Final = re.compile(r"fits ([0-9x, ]+)")
+_NO_FIT: Final = re.compile(r"does not fit (\d+x\d+): ([^;]+)")
 # The words of the page itself.
 WORDS: Final = {
     "close": say("editor_close"),
@@ -109,7 +112,7 @@ def place_list(editor: Editor, page_id: str) -> dict[str, Any]:
     """The parts of a page that can be selected, and the faulty ones."""
     panel, document = editor.preview.panel, editor.document
     if panel is None:
-        return {"page": "", "places": [], "faulty": []}
+        return {"page": "", "places": [], "faulty": [], "fits": {}}
     page = panel.page(page_id) or panel.pages[0]
     if page_id and page.id != page_id:
         raise NotFound(f'there is no page "{page_id:.64}"')
@@ -118,7 +121,18 @@ def place_list(editor: Editor, page_id: str) -> dict[str, Any]:
         {"path": table_at(document.tables, path_at(fault.place)), "message": fault.message}
         for fault in editor.checked.faults
     ]
-    return {"page": page.id, "places": places, "faulty": faulty}
+    return {"page": page.id, "places": places, "faulty": faulty, "fits": _fits(editor, page.id)}
+
+
+def _fits(editor: Editor, page_id: str) -> dict[str, str]:
+    """Screen → why the page does not fit it, "" if it does, of the panel's screens, as `check` says
+    it."""
+    fits: dict[str, str] = {}
+    for message in (note.message for note in editor.checked.notes if note.id == page_id):
+        if fitting := _FITS.match(message):
+            fits |= dict.fromkeys(fitting[1].split(", "), "")
+        fits |= dict(_NO_FIT.findall(message))
+    return fits
 
 
 def _outline(request: PartRequest) -> tuple[str, Mapping[str, Any]]:

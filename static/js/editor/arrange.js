@@ -56,7 +56,20 @@ async function askPlaces() {
   if (!response.ok || turn !== asked) return;
   const answer = await response.json();
   ({ places, faulty } = answer);
+  markSizes(answer.fits);
   drawRings();
+}
+
+// Which screens the page fits, and why not the others; of those that are none of the panel's nothing is known.
+/** @param {Record<string, string>} fits */
+function markSizes(fits) {
+  for (const button of document.querySelectorAll("[data-size]")) {
+    const why = fits[button.dataset.size ?? ""];
+    button.dataset.fits = why === undefined ? "" : why ? "no" : "yes";
+    button.title = why ?? "";
+    const mark = button.querySelector("small");
+    if (mark) mark.textContent = why ?? "";
+  }
 }
 
 export function drawRings() {

@@ -81,9 +81,25 @@ onMessage((text) => {
 });
 
 get("pages").addEventListener("click", (event) => {
-  const key = event.target instanceof Element ? event.target.closest("[data-page]") : null;
+  const target = event.target instanceof Element ? event.target : null;
+  const key = target?.closest("[data-page]");
   if (key?.dataset.page) preview.showPage(key.dataset.page);
+  const add = target?.closest("[data-add-page]");
+  if (add) addPage(add.textContent?.trim() ?? "");
 });
+
+// At the end, with the first id that is free.
+/** @param {string} title */
+async function addPage(title) {
+  const ids = new Set([...get("pages").querySelectorAll("[data-page]")].map((key) => key.dataset.page));
+  let number = ids.size + 1;
+  while (ids.has(`page_${number}`)) number += 1;
+  const value = { id: `page_${number}`, title: `${title} ${number}` };
+  const answer = await edit([{ op: "insert", path: ["page", ids.size], value }]);
+  if (!answer?.select) return;
+  select(answer.select, "edit");
+  preview.showPage(value.id);
+}
 
 // The editor itself is light or dark as its reader's system is.
 const isDark = matchMedia("(prefers-color-scheme: dark)");
@@ -96,7 +112,10 @@ showTheme();
 // The page may be in another language and theme than the file says, as this browser has chosen before.
 function markChoices() {
   const { lang, dataset } = preview.shownDocument()?.documentElement ?? {};
-  if (lang) press("language", lang);
+  if (lang && lang !== shownLanguage().language) {
+    press("language", lang);
+    panes.fill(get("pages"), "pages", shownLanguage());
+  }
   if (dataset?.theme) press("theme-of", dataset.theme);
 }
 preview.onDrawn(markChoices);

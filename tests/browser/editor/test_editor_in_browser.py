@@ -232,6 +232,24 @@ def test_pages_sizes_languages_and_themes(desk: Page) -> None:
     assert preview(desk).locator("html").evaluate("() => [innerWidth, innerHeight]") == [1024, 600]
 
 
+def test_a_page_is_added_at_the_end(desk: Page, editor: EditorServer) -> None:
+    desk.locator("#pages .add").click()
+    expect(desk.locator("#pages [data-page='page_3']")).to_have_attribute("aria-current", "page")
+    assert editor.http.get("/text").text.endswith('[[page]]\nid = "page_3"\ntitle = "Page 3"\n')
+    expect(preview(desk).locator("nav.pages [aria-current]")).to_have_text("Page 3")
+
+
+def test_a_size_says_whether_the_page_fits_it(desk: Page, editor: EditorServer) -> None:
+    small = desk.locator("[data-size='1024x600']")
+    expect(small).to_have_attribute("data-fits", "")
+    editor.edit({"op": "set", "path": ["page", 0, "fit"], "value": True}).raise_for_status()
+    expect(small).to_have_attribute("data-fits", "yes")
+    wide = {"op": "set", "path": [*SPEED, "span"], "value": 12}
+    more = [{"op": "duplicate", "path": SPEED, "to": [*SPEED[:-1], 1]}] * 14
+    editor.edit(wide, *more).raise_for_status()
+    expect(small).to_have_attribute("data-fits", "no")
+
+
 def test_the_outline_by_keys(desk: Page) -> None:
     tree = desk.locator(".tree")
     first = tree.locator(".tr").first
