@@ -5,7 +5,8 @@ import { onState, state } from "./wire.js";
 
 const ROOT = "/preview";
 const COOKIE_S = 365 * 86_400;
-const PAGE = /\/pages\/([^/?]+)/;
+// Pages are below the path of their robot, if the panel has several.
+const PAGE = /^(\/preview(?:\/robots\/[^/]+)?)(?:\/pages\/([^/?]+))?/;
 
 const view = /** @type {HTMLElement} */ (document.getElementById("view"));
 const frames = /** @type {HTMLElement} */ (document.getElementById("frames"));
@@ -19,6 +20,7 @@ let coming = null;
 /** @type {Document | null} */
 let markup = null; // what the page in the frame was made from
 let page = "";
+let base = ROOT;
 let drawn = 0; // the number of the panel that the frame shows
 let live = 0; // the number of the panel whose sessions the frame's scripts read
 let size = { width: 1280, height: 800 };
@@ -73,7 +75,7 @@ function fit() {
 }
 
 /** @param {string} [query] */
-const address = (query = "") => `${ROOT}/${page ? `pages/${page}` : ""}${query}`;
+const address = (query = "") => `${base}/${page ? `pages/${page}` : ""}${query}`;
 
 // Loads the page in a new frame, which takes the place of the old one when it is there.
 function load() {
@@ -92,8 +94,9 @@ function load() {
 /** @param {HTMLIFrameElement} made @param {number} number */
 async function loaded(made, number) {
   const shown = made.contentDocument;
-  const name = PAGE.exec(made.contentWindow?.location.pathname ?? "")?.[1];
+  const [, around = base, name] = PAGE.exec(made.contentWindow?.location.pathname ?? "") ?? [];
   if (!shown || (made !== coming && made !== frame)) return;
+  base = around;
   if (name) page = name;
   if (!page) page = shown.querySelector('input[name="_page"]')?.getAttribute("value") ?? "";
   // What its scripts have changed since it came is not what an edit changes.
@@ -140,6 +143,7 @@ async function draw() {
   if (wanted < drawn || shown !== frame?.contentDocument || before !== markup) return;
   if (!after) {
     page = "";
+    base = ROOT;
     load();
     return;
   }

@@ -1,6 +1,7 @@
 """The editor's server: who is let in, edits, panes, and the preview."""
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -9,7 +10,7 @@ import httpx
 import pytest
 
 from tests.support.editor import PANEL, EditorServer, editing
-from tests.support.parts import until
+from tests.support.parts import ROOT, until
 from tests.support.processes import command
 from tests.support.processes.command import COMMAND
 
@@ -278,3 +279,13 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     done = command.run(COMMAND, "edit", str(tmp_path / "none.toml"))
     assert done.returncode == 1
     assert "none.toml" in done.stderr
+
+
+def test_pages_of_several_robots_are_drawn_below_their_paths(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(ROOT / "docs/examples/welding-cell", tmp_path / "cell"))
+    with editing(folder, (folder / "panel.toml").read_text()) as editor:
+        drawn = editor.edit({"op": "set", "path": ["title"], "value": "Another cell"}).json()["drawn"]
+        page = editor.http.get(f"/preview/robots/left/pages/weld?drawn={drawn}")
+        assert page.status_code == 200
+        assert "Another cell" in page.text
+        assert "/preview/robots/right/" in page.text
