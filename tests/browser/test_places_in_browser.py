@@ -75,6 +75,67 @@ def test_a_place_of_the_list_is_chosen_shown_and_sent_once(shuttle: Server, touc
     assert chosen(page) == ""
 
 
+def test_a_goal_is_set_and_sent_by_keys_alone(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    hall = widget(page, "hall")
+    view = hall.locator(".map-view")
+    expect(view).to_have_attribute("role", "application")
+    view.focus()
+    page.keyboard.press("Enter")
+    said = hall.locator(".map-crosshair")
+    first = "x 0.00 m, y 0.00 m"
+    expect(said).to_contain_text(first)
+    expect(said).to_contain_text("Enter sets it")
+    assert violations(page) == []
+    expect(hall.locator(".map-goal")).to_have_attribute("data-touched", "")
+    page.keyboard.press("Escape")
+    expect(said).to_have_text("")
+    page.keyboard.press("Enter")
+    expect(said).to_contain_text(first)
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("Shift+ArrowRight")
+    expect(said).not_to_contain_text(first)
+    page.keyboard.press("Enter")
+    expect(card(page)).to_be_focused()
+    expect(said).to_have_text("")
+    assert chosen(page).startswith("x=")
+    drive = widget(page, "drive").locator("button[type=submit]")
+    for _ in range(6):
+        page.keyboard.press("Tab")
+        if drive.evaluate("(key) => key === document.activeElement"):
+            break
+    expect(drive).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(receipt(page)).to_contain_text("x ")
+    assert chosen(page) == ""
+
+
+def test_keys_move_the_crosshair_by_steps_and_the_map_at_its_edge(shuttle: Server, page: Page) -> None:
+    opened(page, shuttle)
+    mark = widget(page, "hall").locator(".map-goal > circle")
+    page.locator(".map-view").focus()
+    page.keyboard.press("Enter")
+    expect(mark).to_be_visible()
+
+    def x() -> float:
+        page.evaluate(DRAWN)
+        box = place(mark)
+        return box["x"] + box["width"] / 2
+
+    before = x()
+    page.keyboard.press("ArrowRight")
+    step = x() - before
+    assert step == pytest.approx(20 / 0.22, abs=2)
+    page.keyboard.press("Shift+ArrowRight")
+    assert x() - before - step == pytest.approx(2 / 0.22, abs=1)
+    for _ in range(30):
+        page.keyboard.press("ArrowRight")
+    view = place(page.locator(".map-view"))
+    assert x() <= view["x"] + view["width"] - 20
+
+
 def test_nothing_chosen_is_nothing_sent(shuttle: Server, page: Page) -> None:
     opened(page, shuttle)
     send(page)

@@ -93,6 +93,7 @@ WORDS: Final = (
     "map_level_by_hand",
     "place_choose",
     "place_choose_touch",
+    "place_crosshair",
     "place_all_locked",
     "place_no_answer",
     "place_clear",
@@ -200,6 +201,8 @@ def page_words(
     own |= {"lines": partial(_lines_now, fleet, session, language)}
     own |= {"minutes": lambda minutes: say("alarms_minutes", count=number(str(minutes)))}
     own |= {"overview_robots": say("overview_robots", count=number(str(len(panel.robots))))}
+    # The browser puts in where the crosshair is.
+    own |= {"place_crosshair_at": say("place_crosshair_at", x="{x}", y="{y}", degrees="{degrees}")}
     shown = (*page.widgets, *panel.frame.widgets)
     has_stop = any(isinstance(widget, Command) and is_stop(widget) for widget in shown)
     own |= {"cleaning": say("cleaning" if has_stop else "cleaning_without_stop")}

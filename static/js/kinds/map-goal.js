@@ -108,6 +108,7 @@ export class Goal {
     this.#mark.append(
       svgElement("circle", { r: RING_PX }),
       svgElement("path", { d: `M0 0H${ARROW_PX}m-12-10 12 10-12 10` }),
+      svgElement("path", { class: "map-cross", d: "M-4000 0H-24M24 0H4000M0-4000V-24M0 24V4000" }),
     );
     view.onDraw(() => this.#draw());
   }
@@ -133,9 +134,16 @@ export class Goal {
 
   // A finger, or the main button of a mouse: `chosen` gets the value of the input, and the pose. The numbers are those
   // that the server reads, whatever the language.
-  /** @param {(value: string, pose: number[]) => void} chosen */
-  onTouch(chosen) {
+  // `texts` has what is said of a pose that keys set.
+  /** @param {(value: string, pose: number[]) => void} chosen @param {HTMLElement} texts */
+  onTouch(chosen, texts) {
     this.#map.dataset.goals = "";
+    /** @param {number[]} pose @param {string} version */
+    const choose = (pose, version) => {
+      const [x, y, yaw] = pose.map((part) => part.toFixed(2));
+      chosen(`x=${x} y=${y} yaw=${yaw} map=${version}`, [Number(x), Number(y), Number(yaw)]);
+    };
+    this.#byKeys((pose) => choose(pose, this.#view.version), texts);
     this.#view.onPointer((event) => {
       const start = event.button === 0 && !PHONE.matches ? this.#view.pointAt(event) : null;
       if (!start) return null;
@@ -145,9 +153,9 @@ export class Goal {
       follow(this.#map, event, {
         move: (moved) => this.#touch([start.x, start.y, direction(moved)]),
         end: (moved) => {
-          const [x, y, yaw] = [start.x, start.y, direction(moved)].map((part) => part.toFixed(2));
+          const pose = [start.x, start.y, direction(moved)];
           this.#touch(null);
-          chosen(`x=${x} y=${y} yaw=${yaw} map=${version}`, [Number(x), Number(y), Number(yaw)]);
+          choose(pose, version);
         },
         cancel: () => this.#touch(null),
       });
@@ -156,6 +164,12 @@ export class Goal {
         this.#touch(null);
       };
     });
+  }
+
+  /** @param {(pose: number[]) => void} set @param {HTMLElement} texts */
+  async #byKeys(set, texts) {
+    const { Crosshair } = await import("./map-crosshair.js");
+    new Crosshair(this.#map, this.#view, { show: (pose) => this.#touch(pose), set, texts });
   }
 
   // Where the finger was dragged; without a drag straight on from the robot, else to the east.
@@ -183,7 +197,9 @@ export class Goal {
     const { x, y } = this.#view.at(pose[0], pose[1]);
     const radius = this.#view.at(pose[0] + this.#radius, pose[1]).x - x;
     this.#mark.children[0].setAttribute("r", String(Math.max(radius, RING_PX)));
-    this.#mark.setAttribute("transform", `translate(${x} ${y}) rotate(${(-pose[2] * 180) / Math.PI})`);
+    const turn = (-pose[2] * 180) / Math.PI;
+    this.#mark.setAttribute("transform", `translate(${x} ${y}) rotate(${turn})`);
+    this.#mark.children[2].setAttribute("transform", `rotate(${-turn})`);
   }
 }
 

@@ -178,6 +178,22 @@ export class MapView {
     return this.#perMetre;
   }
 
+  // The middle of the view, in metres of the map's frame.
+  get middle() {
+    return { ...this.#centre };
+  }
+
+  // Moves the map so far that a point of it, in metres, is at least `margin` pixels within the view.
+  /** @param {number} x @param {number} y @param {number} margin */
+  bring(x, y, margin) {
+    const { clientWidth, clientHeight } = this.#view;
+    const at = this.at(x, y);
+    const inside = (/** @type {number} */ part, /** @type {number} */ size) =>
+      Math.min(Math.max(part, margin), size - margin) - part;
+    const [right, down] = [inside(at.x, clientWidth), inside(at.y, clientHeight)];
+    if (right || down) this.#pan(right, down);
+  }
+
   // Of the view, in pixels.
   get width() {
     return this.#view.clientWidth;

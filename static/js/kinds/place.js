@@ -241,7 +241,7 @@ class PlaceInput {
     this.#symbols = new Places(map, view, (id) => this.#choosePlace(id));
     this.#goal = new Goal(map, view);
     this.#goal.surround(Number(this.#root.dataset.radius));
-    if ("touch" in this.#root.dataset) this.#goal.onTouch((value, pose) => this.choose(value, pose));
+    if ("touch" in this.#root.dataset) this.#goal.onTouch((value, pose) => this.choose(value, pose), this.#root);
   }
 
   /** @param {string} id */
