@@ -13,7 +13,9 @@ from app.panel.widgets.families import Command, Input
 from app.panel.widgets.map_view import MapView
 from app.ros.messages import Interfaces, Type
 from app.system.errors import FieldError, Remark
+from app.system.texts import render
 
+ESTIMATE: Final = "geometry_msgs/msg/PoseWithCovarianceStamped"
 MAX_EQUAL_WRITTEN: Final = 9  # elements of a list of equal values
 Comments = Mapping[str, str]  # by input ids ("speed"), and by places of fields (".poses[0].x")
 
@@ -28,7 +30,7 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
                 lines = _preview_lines(widget, interfaces, comments)
                 yield Remark(f"page[{p}].{place}", "\n".join(lines))
             elif isinstance(widget, MapView):
-                yield Remark(f"page[{p}].{place}", _map_line(widget))
+                yield Remark(f"page[{p}].{place}", "\n".join(_map_lines(widget, panel)))
     for w, widget in enumerate(panel.frame.widgets):
         if isinstance(widget, Command):
             yield Remark(f"frame.widget[{w}]", "\n".join(_preview_lines(widget, interfaces, {})))
@@ -38,11 +40,33 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
         yield Remark(f"recipe[{r}]", "\n".join(_preview_lines(load, interfaces, comments)))
 
 
-def _map_line(widget: MapView) -> str:
-    """What its origin means, which only the robot's message says."""
+def _map_lines(widget: MapView, panel: Panel) -> Iterator[str]:
+    """What depends on the robot's messages, and the doctor compares with them."""
     topics = " and ".join(level.topic for level in widget.maps)
     drawn = f"shows {topics} with the rotation of its origin"
-    return f"{drawn}; Nav2's costmap and AMCL ignore that rotation"
+    yield f"{drawn}; Nav2's costmap and AMCL ignore that rotation"
+    pose = widget.pose
+    if pose is not None and pose.type == ESTIMATE:
+        yield (
+            f"the robot is old on it {widget.max_age_s:g} s after the last {pose.topic}: "
+            "AMCL publishes only while the robot moves"
+        )
+    elif pose is None and not widget.levels:
+        yield f"the robot is on it while transforms lead from its frame to {widget.base_frame}"
+    if any(level.qos.durability == "volatile" for level in widget.maps):
+        yield "its QoS is volatile: a panel that starts after the map gets none"
+    levels = {None, *(level.id for level in widget.maps)}
+    for version in dict.fromkeys(
+        zone.map_version for zone in panel.zones if zone.map_version and zone.level in levels
+    ):
+        zones = [
+            render(zone.label)
+            for zone in panel.zones
+            if zone.map_version == version and zone.kind == "keep_out"
+        ]
+        if not zones:
+            continue
+        yield f"closed to goals on its version {version} only: {', '.join(zones)}"
 
 
 def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) -> Iterator[str]:

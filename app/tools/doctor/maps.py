@@ -1,14 +1,14 @@
 """The maps of a panel on its robot: latched, readable, and with a way to the robot. Pure."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from app.cell.robot.maps import Geometry, NoMap, read_grid
+from app.cell.robot.maps import Geometry, Grid, NoMap, read_grid
 from app.cell.robot.transforms import TF, TF_STATIC, LocatedFrame, TransformTree
 from app.panel.widgets.map_view import MapView, PoseTopic
 from app.ros.messages import Interfaces
 from app.system.errors import DecodeError
-from app.system.texts import TextLike
+from app.system.texts import TextLike, joined
 from app.tools.doctor.findings import Report
 from app.tools.doctor.names import PanelNames
 from app.tools.doctor.received import ReceivedSamples
@@ -35,9 +35,11 @@ class MapChecks:
         for topic in (*maps, *((TF_STATIC,) if uses_transforms else ())):
             self._check_latched(topic)
         tree = self._transforms() if uses_transforms else TransformTree()
-        read = {topic: self._geometry(topic) for topic in maps}
+        read = {topic: self._grid(topic) for topic in maps}
         for view in self._views:
-            known = [grid for level in view.maps if (grid := read[level.topic]) is not None]
+            grids = [grid for level in view.maps if (grid := read[level.topic]) is not None]
+            self._check_zones(view, read)
+            known = [grid.geometry for grid in grids]
             if len(view.maps) == len(known) == 1:
                 self._check_way(view, known[0], tree)
             elif known:
@@ -56,20 +58,38 @@ class MapChecks:
         for sample in self._observed.samples[self._behind.robot.key(topic)]:
             yield bytes(sample.payload), sample.at
 
-    def _geometry(self, topic: str) -> Geometry | None:
-        """Where the newest map is; None without one, or where its topic has another type."""
+    def _grid(self, topic: str) -> Grid | None:
+        """The newest map; None without one, or where its topic has another type."""
         *_, (payload, _) = ((b"", 0.0), *self._payloads(topic))
         wanted = self._behind.robot.panel.listened()[topic]
         if not payload or any(end.type != wanted for end in self._behind.publishers(topic)):
             return None
         try:
-            geometry = read_grid(self._interfaces, payload).geometry
+            grid = read_grid(self._interfaces, payload)
         except NoMap as error:
             self._find("map_unreadable", topic, detail=error.reason)
             return None
+        geometry = grid.geometry
         size = f"{geometry.width} x {geometry.height} cells of {geometry.resolution:g} m"
         self._report.fact(f'map {topic} has {size}, frame "{geometry.frame}"')
-        return geometry
+        return grid
+
+    def _check_zones(self, view: MapView, read: Mapping[str, Grid | None]) -> None:
+        """Whether zones of a version are of a map that is there: else they are out of force."""
+        for level in view.maps:
+            grid = read[level.topic]
+            zones = [
+                zone
+                for zone in self._behind.robot.panel.zones
+                if zone.map_version is not None and zone.level in (None, level.id)
+            ]
+            versions = {grid.version for other in view.maps if (grid := read[other.topic]) is not None}
+            outdated = [zone for zone in zones if zone.map_version not in versions]
+            if grid is None or not outdated:
+                continue
+            labels = joined([zone.label for zone in outdated], "between_names")
+            self._find("map_zones_outdated", level.topic, version=grid.version, zones=labels)
+            return
 
     def _transforms(self) -> TransformTree:
         tree = TransformTree()

@@ -73,6 +73,7 @@ WARNINGS: Final = (
     "topic_no_publisher",
     "topic_no_subscriber",
     "map_not_latched",
+    "map_zones_outdated",
     "permission_publishers",
     "permission_not_latched",
 )

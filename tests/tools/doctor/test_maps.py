@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import pytest
 
+from app.cell.robot.maps import read_grid
 from app.panel import load_panel
 from app.panel.widgets.map_view import TF_TYPE
 from app.ros.graph.model import EndpointQos, GraphSnapshot, RobotGraph, SurveyedTopic, TopicEndpoint
@@ -103,6 +104,43 @@ def test_no_way_from_the_map_to_the_robot(transforms: list[tuple[str, str]], tmp
 def test_map_that_can_not_be_shown(info: dict[str, Any], tmp_path: Path) -> None:
     report = judged(tmp_path, VIEW, [topic("/map")], ("/map", {**MAP, "info": info}))
     assert named(report.findings) == [("map_unreadable", "/map")]
+
+
+ZONE: Final = """
+[[zone]]
+id = "pit"
+label = "Pit"
+kind = "keep_out"
+points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
+"""
+
+
+@pytest.mark.parametrize("is_current", [True, False, None])
+def test_zones_of_a_map_that_was_made_again_are_named(is_current: bool | None, tmp_path: Path) -> None:
+    version = read_grid(INTERFACES, INTERFACES.encode(GRID, MAP)).version
+    of = {True: version, False: "0" * 16, None: ""}[is_current]
+    zone = ZONE + (f'map_version = "{of}"\n' if of else "")
+    sent = (("/map", MAP), ("/tf", transform("map", "base_link")))
+    report = judged(tmp_path, zone + VIEW, [topic("/map"), topic("/tf_static")], *sent)
+    if is_current is False:
+        assert named(report.findings) == [("map_zones_outdated", "/map")]
+        assert report.findings[0].details == {"version": version, "zones": "Pit"}
+    else:
+        assert report.codes() == []
+
+
+LEVELS: Final = f"""{VIEW}level = [
+  {{ id = "ground", label = "Ground", topic = "/map" }},
+  {{ id = "upper", label = "Upper", topic = "/upper" }},
+]
+"""
+
+
+@pytest.mark.parametrize(("frame", "codes"), [("map", []), ("odom", ["map_no_transform"])])
+def test_of_levels_one_has_a_way_to_the_robot(frame: str, codes: list[str], tmp_path: Path) -> None:
+    sent = (("/map", MAP), ("/tf", transform(frame, "base_link")))
+    report = judged(tmp_path, LEVELS, [topic("/map"), topic("/tf_static")], *sent)
+    assert report.codes() == codes
 
 
 @pytest.mark.parametrize(("frame", "codes"), [("map", []), ("/map", []), ("odom", ["map_pose_frame"])])
