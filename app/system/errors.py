@@ -124,8 +124,8 @@ class PanelError(KioskError):
 
 
 class InterfaceError(KioskError):
-    """`source` is the interface file or folder at fault, or None. `package` is the missing package, or
-    ""."""
+    """`source` is the interface file or folder at fault, or None. `package` is the missing package,
+    "interfaces" where no folder has any, or ""."""
 
     def __init__(self, message: str, source: Path | None = None, package: str = "") -> None:
         super().__init__(message)

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from app.cell.permission.verdict import topic_mismatch
 from app.cell.robot.maps import Arrival, Geometry, Grid
-from app.cell.robot.places import is_marked_near
+from app.cell.robot.places import is_marked_near, values_of
 from app.cell.robot.state import RobotState
 from app.cell.robot.transforms import Pose
 from app.panel.base import TopicQos
@@ -68,7 +68,7 @@ class Mask(NamedTuple):
     def limits(self) -> list[TextLike]:
         """The speed limits that it has, the lowest first."""
         unit = "%" if self.type == SPEED_PERCENT else "m/s"
-        cells = {cell for cell in set(bytes(self.grid.cells)) if self.marked[cell]}
+        cells = [cell for cell in values_of(self.grid) if self.marked[cell]]
         values = sorted({round(cell * self.multiplier + self.base, 2) for cell in cells})
         return [number(f"{value:g}", unit) for value in values[:MAX_NAMED]]
 

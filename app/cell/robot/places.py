@@ -13,6 +13,7 @@ from app.system.limits import BoundedDict
 
 Floor = Literal["outside", "occupied", "unknown", "free"]
 MAX_ROWS: Final = 400  # of cells that are looked at: a millisecond, however small the cells
+VALUES: Final = "values"  # a key of what is kept with a grid
 MAX_KEPT: Final = 2_000  # floors of one map, and circles with the zones that they touch
 
 
@@ -42,6 +43,18 @@ def is_marked_near(grid: Grid, x: float, y: float, radius: float, marked: bytes)
         )
         grid.floors[asked] = known
     return bool(known)
+
+
+def values_of(grid: Grid) -> frozenset[int]:
+    """The bytes that its cells have. Kept with the grid: each view asks for them."""
+    known = grid.floors.get(VALUES)
+    if known is None:
+        values, rest = set(), bytes(grid.cells)
+        while rest:
+            values.add(rest[0])
+            rest = rest.translate(None, rest[:1])
+        known = grid.floors[VALUES] = frozenset(values)
+    return frozenset(known)
 
 
 def _floor(grid: Grid, x: float, y: float, radius: float) -> Floor:

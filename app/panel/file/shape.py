@@ -250,7 +250,7 @@ class StandIns:
     """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
     are kinds of causes that can't be checked: the existing "interlock"s, "input"s, "control"s or
     "alarm"s, the topics that the panel "listens" to, the "action"s of conditions and alarms, the
-    "group"s of alarms, the "figure"s of robots, the "map"s, or the "place"s on them."""
+    "group"s of alarms, the "figure"s of robots, the "map"s, their "level"s, or "place"s on them."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
@@ -280,12 +280,12 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                 return None  # all types may be different
             case ("page", int(p), "group", int(g), str(key), *_):
                 rest.tables["page"][p]["group"][g].pop(key, None)
-                rest.undecidable.update(("input", "control", "listens"))
+                rest.undecidable.update(("input", "control", "listens", "level"))
             case ("page", int(p), str(key), *_):
                 page = rest.tables["page"][p]
                 page.pop(key, None)
                 rest.tables["page"][p] = {"id": f"faulty_{p}", "title": "?"} | page
-                rest.undecidable.update(("input", "control", "listens", "page"))
+                rest.undecidable.update(("input", "control", "listens", "level", "page"))
             case ("interlock" | "condition" as name, int(i), *_):
                 stand_in = _stand_in(tables[name][i], f"{name}_{i}")
                 rest.tables[name][i] = stand_in | {"topic": f"/faulty_{name}_{i}"}
@@ -318,7 +318,7 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
                     rest.undecidable.add("picture")
                 if closest_name(key, TABLES):
                     rest.undecidable.update(("interlock", "listens", "page", "robot", "alarm"))
-                    rest.undecidable.update(("group", "place"))
+                    rest.undecidable.update(("group", "place", "level"))
     return rest
 
 
@@ -331,7 +331,7 @@ def _widget(rest: StandIns, tables: dict[str, Any], path: Path) -> None:
     stand_in = _stand_in(old, "_".join(str(step) for step in path if isinstance(step, int)))
     around[path[-1]] = stand_in | {"kind": "text"}
     rest.faulty.add(stand_in["id"])
-    rest.undecidable.update(("listens", "control", "map", *_unnamed("input", old)))
+    rest.undecidable.update(("listens", "control", "map", "level", *_unnamed("input", old)))
 
 
 def _stand_in(old: Any, number: str) -> dict[str, Any]:

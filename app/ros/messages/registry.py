@@ -242,7 +242,8 @@ class Interfaces:
             return InterfaceError(why)
         hint = f"there is no package {package}: its folder must be among the panel's `interfaces`"
         hint += f", or did you mean {' or '.join(near)}?" if near else ""
-        return InterfaceError(f"{why}; {hint}", package=package)
+        # Without any folder, all of them are absent for one reason.
+        return InterfaceError(f"{why}; {hint}", package=package if self._folders else "interfaces")
 
 
 def _suggestions(name: str, known: Sequence[str]) -> list[str]:

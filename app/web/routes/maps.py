@@ -47,7 +47,7 @@ class RouteGraphAnswer(BaseModel):
 @router.get(
     "/widgets/{widget}/map/{version}/{column}-{row}.png",
     response_class=Response,
-    summary="A tile of a map or of a costmap over it: 512 cells a side, from the upper left",
+    summary="A tile of a map, or of a costmap or mask over it: 512 cells a side, from the upper left",
     responses=errors(403, 404, 422, 429) | PNG,
 )
 async def map_tile(

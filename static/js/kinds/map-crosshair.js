@@ -38,7 +38,7 @@ export class Crosshair {
     area.setAttribute("role", "application");
     area.setAttribute("aria-description", this.#text("begin"));
     area.addEventListener("keydown", (event) => this.#key(event), { capture: true });
-    area.addEventListener("blur", () => this.#end());
+    area.addEventListener("blur", () => document.hasFocus() && this.#end()); // not by another window
     area.addEventListener("pointerdown", () => this.#end());
   }
 

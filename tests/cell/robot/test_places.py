@@ -7,7 +7,7 @@ import pytest
 
 from app.cell.robot import places
 from app.cell.robot.maps import GRID_TYPE, Grid, read_grid
-from app.cell.robot.places import MAX_KEPT, KeepOut, floor_at
+from app.cell.robot.places import MAX_KEPT, KeepOut, floor_at, values_of
 from app.panel.places import Zone
 from tests.support.builders import INTERFACES
 
@@ -116,6 +116,12 @@ def test_a_hole_is_not_of_the_zone(x: float, y: float, is_in: bool) -> None:
     square = [[0, 0], [3, 0], [3, 3], [0, 3]]
     with_hole = zone(points=square, holes=[[[1, 0.5], [2, 0.5], [2, 2], [1, 2]]])
     assert (KeepOut([with_hole]).at("a" * 16, "", x, y, 0.3) is not None) == is_in
+
+
+def test_the_bytes_of_a_grid_are_found_once() -> None:
+    grid = grid_of()
+    assert values_of(grid) == {0, 40, 100, 255}
+    assert values_of(grid) is values_of(grid)
 
 
 def test_other_zones_and_those_of_other_maps_are_only_shown() -> None:

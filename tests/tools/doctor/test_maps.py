@@ -118,8 +118,8 @@ points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
 @pytest.mark.parametrize("is_current", [True, False, None])
 def test_zones_of_a_map_that_was_made_again_are_named(is_current: bool | None, tmp_path: Path) -> None:
     version = read_grid(INTERFACES, INTERFACES.encode(GRID, MAP)).version
-    of = {True: version, False: "0" * 16, None: ""}[is_current]
-    zone = ZONE + (f'map_version = "{of}"\n' if of else "")
+    wanted = {True: version, False: "0" * 16, None: ""}[is_current]
+    zone = ZONE + (f'map_version = "{wanted}"\n' if wanted else "")
     sent = (("/map", MAP), ("/tf", transform("map", "base_link")))
     report = judged(tmp_path, zone + VIEW, [topic("/map"), topic("/tf_static")], *sent)
     if is_current is False:
