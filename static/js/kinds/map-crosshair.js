@@ -35,11 +35,17 @@ export class Crosshair {
     this.#line.setAttribute("role", "status");
     map.append(this.#line);
     const area = find(map, ".map-view");
-    area.setAttribute("role", "application");
-    area.setAttribute("aria-description", this.#text("begin"));
+    view.onDraw(() => this.#offer(area)); // with the first map: before, Enter begins nothing
     area.addEventListener("keydown", (event) => this.#key(event), { capture: true });
     area.addEventListener("blur", () => document.hasFocus() && this.#end()); // not by another window
     area.addEventListener("pointerdown", () => this.#end());
+  }
+
+  /** @param {HTMLElement} area */
+  #offer(area) {
+    if (area.hasAttribute("aria-description")) return;
+    area.setAttribute("role", "application");
+    area.setAttribute("aria-description", this.#text("begin"));
   }
 
   /** @param {"begin" | "at"} name */
