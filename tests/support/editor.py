@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from playwright.sync_api import Error as PlaywrightError
+from playwright.sync_api import FloatRect, FrameLocator, Page
 
 from tests.support.parts import until
 from tests.support.processes import command
@@ -112,6 +114,30 @@ class EditorServer:
         with suppress(ProcessLookupError):  # it was killed
             self.process.send_signal(signal.SIGINT)
         command.finished(self.process)
+
+
+def preview(page: Page) -> FrameLocator:
+    """The panel's own page in the editor's."""
+    return page.frame_locator("#frames iframe:not(.coming)")
+
+
+def box_of(page: Page, selector: str) -> FloatRect:
+    """Where an element of the preview is on the screen, in px. A frame that takes the place of the one
+    before has none for a moment."""
+    boxes: list[FloatRect] = []
+
+    def is_there() -> bool:
+        with suppress(PlaywrightError):
+            box = preview(page).locator(selector).bounding_box(timeout=1000)
+            boxes.extend([box] if box else [])
+        return bool(boxes)
+
+    until(is_there, f"{selector} is shown")
+    return boxes[-1]
+
+
+def middle(box: FloatRect) -> tuple[float, float]:
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
 @contextmanager

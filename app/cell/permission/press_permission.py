@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
-from app.cell.permission.goal_places import places_verdict
 from app.cell.permission.interlocks import (
     LINK_CODES,
     blocked_buttons,
@@ -123,6 +122,15 @@ def _control(request: PermissionRequest) -> Verdict:
     return verdict if verdict.permitted or needs_control(request.widget) else WITHOUT_CONTROL
 
 
+def _places(request: PermissionRequest) -> Verdict | None:
+    """Imported only where a panel has places, for a faster start."""
+    if request.widget.id not in request.robot.place_inputs:
+        return None
+    from app.cell.permission.goal_places import places_verdict
+
+    return places_verdict(request.widget.id, request.robot, request.now)
+
+
 CHECKS: Final = (
     Check("role", _role, alike=True),
     # Uniform buttons are those that no person confirms and no alarm locks.
@@ -145,7 +153,7 @@ CHECKS: Final = (
     ),
     Check(
         "places",
-        lambda request: places_verdict(request.widget.id, request.robot, request.now),
+        _places,
         alone=False,
         alike=True,
     ),

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Final, TypedDict
 
-from app.cell.permission.goal_places import map_versions
 from app.cell.permission.verdict import PERMITTED, Verdict
 from app.cell.robot.state import RobotState
 from app.cell.view.conditions import conditions, machine_state, sequence
@@ -25,9 +24,7 @@ from app.cell.view.displays import (
     value,
 )
 from app.cell.view.gauges import figure, gauge, joints
-from app.cell.view.map_values import map_view
 from app.cell.view.parameter_values import parameter
-from app.cell.view.place_values import place_input
 from app.cell.view.stop_brief import stop_brief
 from app.cell.view.table_values import table
 from app.cell.view.times import result_age
@@ -92,6 +89,8 @@ def attributes_of(
     if isinstance(widget, Command):
         attributes, until = find_row(COMMANDS, widget)(widget, robot, verdict, now)
         if widget.id in robot.place_inputs:
+            from app.cell.permission.goal_places import map_versions
+
             attributes = {**attributes, "map_versions": map_versions(widget.id, robot, now)}
     else:
         attributes, until = find_row(ATTRIBUTES, widget)(widget, robot, now)
@@ -204,6 +203,21 @@ def _fixed(widget: BaseWidget, robot: RobotState, now: float) -> AttributesUntil
     return {}, math.inf
 
 
+# Maps and places are imported where a panel has one, for a faster start.
+
+
+def _map_view(widget: MapView, robot: RobotState, now: float) -> AttributesUntil:
+    from app.cell.view.map_values import map_view
+
+    return map_view(widget, robot, now)
+
+
+def _place_input(widget: PlaceInput, robot: RobotState, now: float) -> AttributesUntil:
+    from app.cell.view.place_values import place_input
+
+    return place_input(widget, robot, now)
+
+
 # Of widgets that send nothing.
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Static: _fixed,
@@ -222,8 +236,8 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     SequenceWidget: sequence,
     Gauge: gauge,
     Joints: joints,
-    MapView: map_view,
-    PlaceInput: place_input,
+    MapView: _map_view,
+    PlaceInput: _place_input,
     Table: table,
     AlarmListView: lambda widget, robot, now: alarm_list(widget, robot),
     AlarmLineView: lambda widget, robot, now: alarm_line(widget, robot),

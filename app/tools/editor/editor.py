@@ -14,6 +14,7 @@ from app.tools.editor.merge import Side
 from app.tools.editor.paths import tag_of
 from app.tools.editor.preview import Preview
 from app.tools.editor.repairs import Repair
+from app.tools.editor.robot_list import RobotList
 from app.tools.editor.session import EditSession, SaveConflict
 
 WATCH_S: Final = 1.0
@@ -38,6 +39,7 @@ class Editor:
         self.session = session
         self.changes = 0  # since it was saved
         self.preview = preview
+        self.robots = RobotList(preview.robot_place)
         self.language = language
         self.checked: Checked = NOT_CHECKED
         self.browsers: dict[str, Browser] = {}

@@ -10,6 +10,7 @@ from app.system.errors import InterfaceError, NotFound, Remark
 from app.system.pictures import shipped_pictures
 from app.system.texts import TextLike, render, say
 from app.system.texts.locales import own_name
+from app.tools.editor.adding import parts_pane, pick_pane, robot_pane
 from app.tools.editor.document import DiffLine
 from app.tools.editor.editor import Editor, Part, PartRequest
 from app.tools.editor.forms import FormPage, Link, form_context, form_of, table_path
@@ -293,14 +294,6 @@ def _delete(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     }
 
 
-def _robot(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
-    return "_later.html", {"text": say("editor_robot_later")}
-
-
-def _kinds(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
-    return "_later.html", {"text": say("editor_parts_later")}
-
-
 PARTS: Final[Mapping[str, Part]] = {
     "pages": _pages,
     "outline": _outline,
@@ -308,8 +301,9 @@ PARTS: Final[Mapping[str, Part]] = {
     "diff": _diff,
     "form": _form,
     "delete": _delete,
-    "robot": _robot,
-    "parts": _kinds,
     "merge": merge_page,
     "recovered": recovered_page,
+    "robot": robot_pane,
+    "parts": parts_pane,
+    "pick": pick_pane,
 }

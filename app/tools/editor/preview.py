@@ -36,6 +36,7 @@ from app.system.concurrency import keep_running
 from app.system.settings import Settings, shipped_path
 from app.system.texts import render, say
 from app.system.used_certificates import UsedCertificates
+from app.tools.robot.link import Place
 from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
 from app.web.application import load_pages, new_application, page_assets, page_revision
@@ -157,6 +158,29 @@ class Preview:
         self.number += 1
         self._needs = _needs(tables)
         self._edited.set()
+
+    async def robot_place(self) -> Place | None:
+        """Where the robot is of which the list is read, of several the first; None while there is
+        none."""
+        panel = self._newest
+        if panel is None:
+            return None
+        first = panel.robots[0] if panel.robots else None
+        reached = first or panel
+        place = Place(
+            zenoh=self._settings.zenoh,
+            connect=first.connect if first else (),
+            namespace=reached.namespace,
+            distro=panel.distro,
+            interfaces=panel.interfaces,
+            dialect=reached.dialect,
+            domain=reached.domain,
+        )
+        if self.is_live:
+            return place
+        endpoint = self._robots and self._robots.endpoints.get(first.id if first else None)
+        shipped = shipped_path("zenoh.json5")
+        return replace(place, zenoh=shipped, connect=(endpoint,)) if endpoint else None
 
     # Requests.
 

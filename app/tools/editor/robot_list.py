@@ -106,6 +106,8 @@ class RobotList:
         self._looked = -WATCHED_S
         self._wake = asyncio.Event()
         self.fault: str = ""  # why there is no robot
+        self.version = 0  # of the rows: another number where there are others
+        self._names: object = None
         self.robot: RobotGraph | None = None
         self._below = ""
         self._latest: dict[str, Latest] = {}
@@ -113,6 +115,7 @@ class RobotList:
 
     def look(self) -> None:
         """A browser shows the list now."""
+        self._count()
         self._looked = asyncio.get_running_loop().time()
         self._wake.set()
 
@@ -203,6 +206,15 @@ class RobotList:
         self._parameters = read
 
     # The rows.
+
+    def _count(self) -> None:
+        """A new version where the robot has other names."""
+        robot = self.robot
+        names = robot and (robot.topics, robot.services, robot.actions)
+        known = names, tuple(self._parameters), self.fault
+        if known != self._names:
+            self._names = known
+            self.version += 1
 
     def rows(self, panel: Panel | None) -> Mapping[Section, Sequence[Row]]:
         """All rows by section; of a panel with a story, also what its simulated robot can play."""

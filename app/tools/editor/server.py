@@ -22,6 +22,7 @@ from app.system.errors import KioskError, NotFound
 from app.system.settings import Settings, shipped_path
 from app.system.texts import localized, say
 from app.tools.editor import uploads
+from app.tools.editor.adding import Addition, add
 from app.tools.editor.checked import DocumentChecker
 from app.tools.editor.document import Change, EditError, edit_from, path_from
 from app.tools.editor.editor import Browser, Editor, PartRequest
@@ -116,11 +117,16 @@ def editor_app(
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         await preview.start()
         editor.show()
-        watching = keep_running(editor.watch, log, "watching the file failed")
+        tasks = (
+            keep_running(editor.watch, log, "watching the file failed"),
+            keep_running(editor.robots.run, log, "reading the robot failed"),
+        )
         try:
             yield
         finally:
-            watching.cancel()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
             session.close()
             await preview.stop()
 
@@ -281,6 +287,16 @@ def _add_routes(app: FastAPI) -> None:
             if len(data) > uploads.MOST_BYTES:
                 break
         return _step(request, editor, lambda: uploads.store(editor, path_of(path), name, bytes(data)))
+
+    @app.post("/add")
+    async def add_part(posted: Addition, request: Request, editor: CurrentEditor) -> Response:
+        return _step(request, editor, lambda: add(editor, posted, language_of(request)))
+
+    @app.get("/robot")
+    async def robot_values(request: Request, editor: CurrentEditor) -> Response:
+        editor.robots.look()
+        values = editor.robots.values(editor.preview.panel)
+        return _json(request, {"values": values, "rows": editor.robots.version})
 
     @app.post("/undo")
     async def undo(request: Request, editor: CurrentEditor) -> Response:

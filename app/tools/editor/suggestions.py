@@ -35,6 +35,12 @@ LEAST_DIGITS: Final = 2
 MINUTES: Final = 10  # of a trend
 KEPT: Final = "8h"
 AGE_S: Final = 2.0
+# The part of a group's columns that a new widget takes.
+HALF, THIRD = 1 / 2, 1 / 3
+WIDE: Final = (
+    *("trend", "table", "joints", "camera", "map", "pallet", "sequence", "conditions", "log"),
+    *("alarm_list", "alarm_line", "label"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +194,10 @@ def drop_of(
         own_id = id_of(suggestion.name, taken_ids(tables))
         table = {"id": own_id, "kind": suggestion.kind, **suggestion.table}
         interlocks = tables.get("interlock", ())
-        if len(interlocks) == 1 and _is_command(table) and table.get("role") != "stop":
+        if columns := _columns_at(tables, at):
+            part = 1.0 if suggestion.kind in WIDE else THIRD if is_command(table) else HALF
+            table["span"] = max(1, round(columns * part))
+        if len(interlocks) == 1 and is_command(table) and table.get("role") != "stop":
             table["interlock"] = interlocks[0]["id"]
         return Drop([{"op": "insert", "path": list(at), "value": table}], at)
     listed = tables.get(suggestion.where, ())
@@ -206,6 +215,17 @@ def drop_of(
     return Drop(edits, (suggestion.where, number))
 
 
+def _columns_at(tables: Any, at: Path) -> int:
+    """The columns of the group that a place is in, where it says how many; 0 without."""
+    try:
+        for step in at[:-2]:
+            tables = tables[step]
+    except (LookupError, TypeError):
+        return 0
+    columns = tables.get("columns") if isinstance(tables, Mapping) else None
+    return columns if isinstance(columns, int) else 0
+
+
 def _same_interlock(suggestion: Suggestion, listed: Sequence[Mapping[str, Any]]) -> int | None:
     """The number of the interlock that waits for the same topic."""
     if suggestion.where != "interlock":
@@ -219,7 +239,7 @@ def _lock(tables: Any, on: Path, interlock: str) -> Mapping[str, Any] | None:
     widget = tables
     for step in on:
         widget = widget[step]
-    if not _is_command(widget):
+    if not is_command(widget):
         return None
     known = widget.get("interlock", [])
     names = [known] if isinstance(known, str) else list(known)
@@ -229,7 +249,8 @@ def _lock(tables: Any, on: Path, interlock: str) -> Mapping[str, Any] | None:
     return {"op": "set", "path": [*on, "interlock"], "value": value}
 
 
-def _is_command(widget: Mapping[str, Any]) -> bool:
+def is_command(widget: Mapping[str, Any]) -> bool:
+    """Whether the table of a widget is a command's."""
     kind = KINDS.get(str(widget.get("kind")))
     return kind is not None and issubclass(kind.model, Command)
 

@@ -176,12 +176,25 @@ function showSize(place, x, y) {
 /** @param {Place} moved @param {number} x @param {number} y */
 function showDrop(moved, x, y) {
   drop = dropAt(moved, x, y);
+  showMark(drop);
+}
+
+// Shows where something would come; nothing with null.
+/** @param {Drop | null} drop */
+export function showMark(drop) {
   overlay.querySelector(".drop")?.remove();
   if (!drop) return;
   const mark = document.createElement("div");
   mark.className = `drop${drop.isUpright ? " upright" : ""}`;
   putAt(mark, drop.mark);
   overlay.append(mark);
+}
+
+// Where a new widget would come if it was let go at a point; null where the page has no widget or group.
+/** @param {number} x @param {number} y */
+export function dropOfNew(x, y) {
+  const page = shownPlaces().find(({ selector }) => selector === "main")?.path ?? [];
+  return dropAt({ path: [...page, "widget", Infinity], selector: "", tag: "", size: null }, x, y);
 }
 
 // Where a table would come if it was let go at a point.

@@ -1,4 +1,5 @@
 // Starts the editor's page: its header, its keys and its panes.
+import * as adding from "./adding.js";
 import * as arrange from "./arrange.js";
 import * as change from "./change.js";
 import * as merge from "./merge.js";
@@ -140,4 +141,5 @@ preview.start();
 arrange.start();
 change.start();
 merge.start();
+adding.start();
 open();

@@ -85,6 +85,7 @@ export function showTab(name) {
     tab.setAttribute("aria-selected", String(isChosen));
     if (tab instanceof HTMLElement) tab.tabIndex = isChosen ? 0 : -1;
   }
+  if (left.dataset.part !== name) left.replaceChildren();
   left.dataset.part = name;
   left.setAttribute("aria-labelledby", `tab-${name}`);
   fill(left, name);

@@ -158,6 +158,12 @@ export function pasteText(path, text) {
   return inTurn(() => post("/paste", { path, text }));
 }
 
+// Adds what the panes "Robot" and "Parts" offer, as one step.
+/** @param {Record<string, unknown>} addition */
+export function add(addition) {
+  return inTurn(() => post("/add", { revision: state.revision, ...addition }));
+}
+
 /** @param {"undo" | "redo" | "save"} name */
 export function step(name) {
   return inTurn(() => post(`/${name}`));

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, FilePayload, FloatRect, FrameLocator, Page, expect
+from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
-from tests.support.editor import PANEL, EditorServer, editing
+from tests.support.editor import PANEL, EditorServer, box_of, editing, middle, preview
 from tests.support.parts import until
 
 SPEED: Final = ["page", 0, "group", 0, "widget", 0]
@@ -48,21 +48,6 @@ def desk(page: Page, editor: EditorServer) -> Page:
     expect(page.locator(".tr").first).to_be_visible()
     expect(page.locator("#frames")).to_have_attribute("data-live", str(editor.state()["drawn"]))
     return page
-
-
-def preview(page: Page) -> FrameLocator:
-    return page.frame_locator("#frames iframe:not(.coming)")
-
-
-def box_of(page: Page, selector: str) -> FloatRect:
-    """Where an element of the preview is on the screen, in px."""
-    box = preview(page).locator(selector).bounding_box()
-    assert box is not None
-    return box
-
-
-def middle(box: FloatRect) -> tuple[float, float]:
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
 def chosen(page: Page) -> Any:

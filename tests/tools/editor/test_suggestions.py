@@ -178,3 +178,15 @@ def test_ids_are_unique_beside_those_of_recipes_and_the_frame() -> None:
     (edit,) = drop_of(choice, tables, ("page", 0, "widget", 0)).edits
     assert edit["value"]["id"] == "speed_4"
     assert list(edit["value"])[:3] == ["id", "kind", "label"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "columns", "span"),
+    [("gauge", 12, 6), ("gauge", 1, 1), ("trend", 12, 12), ("publish", 12, 4), ("gauge", None, None)],
+)
+def test_a_widget_takes_a_part_of_its_group(kind: str, columns: int | None, span: int | None) -> None:
+    group = {"widget": [], **({"columns": columns} if columns else {})}
+    tables = {"page": [{"group": [group]}]}
+    at = ("page", 0, "group", 0, "widget", 0)
+    (edit,) = drop_of(Suggestion("widget", kind, {"label": "A"}, "a"), tables, at).edits
+    assert edit["value"].get("span") == span

@@ -1,0 +1,172 @@
+"""The panes "Robot" and "Parts" with a mouse and a keyboard."""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Browser, FloatRect, Page, expect
+
+from tests.browser.test_accessibility import ALL, AXE, RUN
+from tests.support.browser.browsers import ReusedPage
+from tests.support.editor import PANEL, EditorServer, box_of, editing, middle, preview
+from tests.support.parts import until
+
+GUARDED: Final = (
+    PANEL
+    + """
+[[page.widget]]
+id = "guard"
+kind = "indicator"
+label = "Guard"
+topic = "/guard_locked"
+type = "std_msgs/msg/Bool"
+states = [
+  { value = true, text = "Locked", shape = "circle" },
+  { value = false, text = "Open", shape = "cross", colour = "red" },
+]
+"""
+)
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:
+    with editing(tmp_path_factory.mktemp("adding"), GUARDED) as mine:
+        yield mine
+
+
+@pytest.fixture(scope="module")
+def reused_page(chromium: Browser) -> Iterator[ReusedPage]:
+    """Axe may be added to its pages."""
+    mine = ReusedPage(chromium, bypass_csp=True)
+    yield mine
+    mine.close()
+
+
+@pytest.fixture
+def desk(page: Page, running: EditorServer) -> Page:
+    running.edit({"op": "text", "path": [], "text": GUARDED}).raise_for_status()
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.goto(running.address)
+    expect(preview(page).locator("#at-speed")).to_be_visible()
+    return page
+
+
+def written(editor: EditorServer) -> dict[str, Any]:
+    return tomllib.loads(editor.http.get("/text").text)
+
+
+def belt(editor: EditorServer) -> list[dict[str, Any]]:
+    """The widgets of the first group."""
+    widgets: list[dict[str, Any]] = written(editor)["page"][0]["group"][0]["widget"]
+    return widgets
+
+
+def wait(page: Page, is_so: Callable[[], Any], about: str) -> None:
+    """Until something is so, while Playwright's events are read."""
+    until(lambda: page.evaluate("0") or is_so(), about)
+
+
+def item(page: Page, tab: str, name: str) -> Any:
+    """The line of a pane with this name."""
+    page.locator(f"#tab-{tab}").click()
+    line = page.locator(".offer").filter(has=page.locator(f"b:text-is('{name}')"))
+    expect(line).to_be_visible()
+    return line
+
+
+def drag(page: Page, line: Any, x: float, y: float) -> None:
+    boxes: list[FloatRect] = []
+
+    def is_there() -> bool:
+        """The list comes again when there are other rows."""
+        line.scroll_into_view_if_needed()
+        box = line.bounding_box()
+        boxes.extend([box] if box else [])
+        return bool(box)
+
+    until(is_there, "the line is shown")
+    box = boxes[-1]
+    page.mouse.move(box["x"] + 60, box["y"] + 12)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 80, box["y"] + 20)
+    page.mouse.move(x, y, steps=4)
+    expect(page.locator(".ghost")).to_be_visible()
+    page.mouse.up()
+    expect(page.locator(".ghost")).to_have_count(0)
+
+
+def test_the_list_shows_live_values_and_where_they_are_used(desk: Page) -> None:
+    line = item(desk, "robot", "/speed")
+    expect(line.locator("small").first).to_contain_text("Float64")
+    expect(line.locator(".used")).to_have_text("Cell")
+    wait(desk, lambda: line.locator(".value").inner_text(), "the value of /speed")
+
+
+def test_a_topic_dropped_on_the_page_is_shown_as_chosen(desk: Page, running: EditorServer) -> None:
+    x, y = middle(box_of(desk, "#at-ready"))
+    drag(desk, item(desk, "robot", "/load"), x, y + 10)
+    picks = desk.locator(".ways button")
+    expect(picks.first).to_be_focused()
+    titles = picks.locator("b").all_inner_texts()
+    assert "Trend" in titles
+    picks.filter(has_text="Trend").click()
+    until(
+        lambda: desk.evaluate("0") or len(written(running)["page"][0]["group"][0]["widget"]) == 3,
+        "added",
+    )
+    group = written(running)["page"][0]["group"][0]["widget"]
+    trend = next(widget for widget in group if widget["kind"] == "trend")
+    assert trend["pen"][0]["topic"] == "/load"
+    expect(preview(desk).locator(f"#at-{trend['id']}")).to_be_visible()
+
+
+def test_a_permission_dropped_on_a_button_locks_it(desk: Page, running: EditorServer) -> None:
+    drag(desk, item(desk, "robot", "/guard_locked"), *middle(box_of(desk, "#at-open")))
+    first = desk.locator(".ways button").first
+    expect(first.locator("b")).to_have_text("Interlock")
+    first.press("Enter")
+    wait(desk, lambda: "interlock" in written(running), "the interlock is written")
+    tables = written(running)
+    (interlock,) = tables["interlock"]
+    assert interlock["topic"] == "/guard_locked"
+    assert tables["page"][0]["group"][1]["widget"][0]["interlock"] == interlock["id"]
+    desk.locator("#undo").click()
+    wait(desk, lambda: "interlock" not in written(running), "one step is undone")
+
+
+def test_by_keys_alone_a_part_is_added_behind_the_selected(desk: Page, running: EditorServer) -> None:
+    desk.mouse.click(*middle(box_of(desk, "#at-speed")))
+    line = item(desk, "parts", "Text")
+    line.press("Enter")
+    until(
+        lambda: (
+            desk.evaluate("0")
+            or written(running)["page"][0]["group"][0]["widget"][1]["kind"] == "label"
+        ),
+        "the text is added",
+    )
+    label = written(running)["page"][0]["group"][0]["widget"][1]
+    assert label == {"id": "label", "kind": "label", "label": "Text"}
+    expect(preview(desk).locator("#at-label")).to_be_visible()
+
+
+def test_words_filter_the_list_and_escape_adds_nothing(desk: Page, running: EditorServer) -> None:
+    item(desk, "robot", "/load")
+    before = written(running)
+    desk.locator(".left input[name='find']").fill("float load")
+    expect(desk.locator(".offer:visible")).to_have_count(1)
+    line = desk.locator(".offer:visible")
+    line.press("Enter")
+    expect(desk.locator(".ways")).to_be_visible()
+    desk.keyboard.press("Escape")
+    expect(line).to_be_focused()
+    assert written(running) == before
+
+
+@pytest.mark.parametrize("tab", ["robot", "parts"])
+def test_the_panes_have_no_fault_of_accessibility(desk: Page, tab: str) -> None:
+    item(desk, tab, "/speed" if tab == "robot" else "Gauge")
+    desk.evaluate(AXE)
+    run = RUN.replace("document,", "{exclude: ['iframe']},")
+    assert desk.evaluate(run, {"values": ALL, "type": "tag"}) == []
