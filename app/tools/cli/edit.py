@@ -47,7 +47,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def _check(path: Path, host: str, has_tls: bool) -> None:
     """SettingsError if the file can't be edited, or its editor would be open to the network."""
-    if not path.is_file():
+    if not path.is_file() and (path.exists() or not path.parent.is_dir()):
         raise SettingsError(f"{path}: there is no such file")
     if _is_loopback(host) or has_tls:
         return
@@ -75,6 +75,7 @@ def _serve(options: Namespace, settings: Settings) -> int:
     name = f"[{options.host}]" if ":" in options.host else options.host
     if not _is_loopback(options.host):
         settings = replace(settings, hosts=(*settings.hosts, name.lower()))
+    options.panel.touch()
     app = editor_app(
         options.panel,
         settings,
@@ -107,7 +108,7 @@ def make_parser(prog: str) -> Parser:
         " it was written, with its comments.",
     )
     add = parser.add_argument
-    add("panel", metavar="PANEL", type=_panel, help="the panel file")
+    add("panel", metavar="PANEL", type=_panel, help="the panel file; one that is not there is begun")
     add("--host", default="127.0.0.1", help="address to listen on; default: %(default)s")
     add("--port", default=8100, type=port_to_listen, help="default: %(default)s; 0: one that is free")
     add(

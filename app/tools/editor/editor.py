@@ -9,13 +9,15 @@ from typing import Any, Final
 from app.panel.file.toml_lines import Path
 from app.system.texts import TextLike, say
 from app.tools.editor.checked import NOT_CHECKED, Checked, DocumentChecker
-from app.tools.editor.document import Change, Document, Edit
+from app.tools.editor.document import Change, Document, Edit, ReplaceText
 from app.tools.editor.merge import Side
 from app.tools.editor.paths import tag_of
 from app.tools.editor.preview import Preview
 from app.tools.editor.repairs import Repair
 from app.tools.editor.robot_list import RobotList
 from app.tools.editor.session import EditSession, SaveConflict
+from app.tools.editor.starting import empty_text
+from app.tools.scaffold.parts import label_of
 
 WATCH_S: Final = 1.0
 
@@ -50,6 +52,16 @@ class Editor:
     @property
     def document(self) -> Document:
         return self.session.document
+
+    def begin(self) -> None:
+        """Shows the file. An empty one is begun with a page, as a change that is not saved."""
+        session, text = self.session, empty_text(label_of(self.session.path.stem))
+        if session.recovered is not None and session.recovered.text == text:
+            session.drop_recovered()
+        if session.recovered is not None or self.document.text.strip():
+            self.show()
+        else:
+            self.apply([ReplaceText((), text)], "")
 
     def apply(
         self, edits: Iterable[Edit], label: str, revision: int | None = None, author: str = ""

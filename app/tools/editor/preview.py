@@ -211,7 +211,7 @@ class Preview:
     def _drawn(self, path: str) -> AppState:
         """The state for one page of the newest panel: only its widgets are built."""
         assert self._newest is not None
-        page = path.rpartition("/pages/")[2] or self._newest.pages[0].id
+        page = path.partition("/pages/")[2] or self._newest.pages[0].id
         try:
             fleet = self._unconnected(_only(self._newest, page))
         except (KeyError, LookupError, ValueError):  # the page needs widgets of others

@@ -116,7 +116,7 @@ def editor_app(
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         await preview.start()
-        editor.show()
+        editor.begin()
         tasks = (
             keep_running(editor.watch, log, "watching the file failed"),
             keep_running(editor.robots.run, log, "reading the robot failed"),

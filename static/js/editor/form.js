@@ -177,6 +177,13 @@ export class Form {
     return this.refresh();
   }
 
+  // Posts what is being typed, and waits until all that was posted has an answer.
+  enter() {
+    const entry = document.activeElement;
+    if (entry !== this.#composing && this.#pane.contains(entry)) this.#changed(entry);
+    return this.#last;
+  }
+
   // The pane as the server has it now.
   async refresh() {
     const load = ++this.#loads;

@@ -55,7 +55,7 @@ document.addEventListener("keydown", (event) => {
   if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
   const key = event.key.toLowerCase();
   const inText = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement;
-  if (key === "s") take("save");
+  if (key === "s") panes.entered().then(() => take("save"));
   else if (inText) return;
   else if (key === "z") take(event.shiftKey ? "redo" : "undo");
   else if (key === "y") take("redo");

@@ -18,8 +18,12 @@ const shown = new Form(form, {
   upload,
 });
 
+// What is being typed in the form counts as entered.
+export const entered = () => shown.enter();
+
 // The page itself is drawn first after an edit; without it the panes wait no longer than this.
 const AFTER_MS = 300;
+let isFilled = false;
 let isOutdated = false;
 let timer = 0;
 
@@ -63,7 +67,7 @@ function keepPlace(pane) {
   return () => {
     const area = pane.querySelector(".scroll, .fault-list, pre, .form");
     if (area) area.scrollTop = scrolled;
-    if (!named) return;
+    if (!named?.name) return;
     const same = [...pane.querySelectorAll(named.tag)].find((element) => nameOf(element).name === named.name);
     if (same instanceof HTMLElement) same.focus({ preventScroll: true });
   };
@@ -74,7 +78,7 @@ function nameOf(element) {
   const data = element instanceof HTMLElement ? element.dataset : {};
   return {
     tag: element.localName,
-    name: element.id || element.getAttribute("name") || data.path || data.select || data.tab || "",
+    name: element.id || element.getAttribute("name") || data.path || data.select || data.item || data.kindOf || "",
   };
 }
 
@@ -118,7 +122,9 @@ export function start() {
     if (event instanceof KeyboardEvent) onTabKey(event);
   });
   onState((now, before) => {
-    if (now.revision === before.revision && now.drawn === before.drawn && now.saved === before.saved) return;
+    const isKnown = now.revision === before.revision && now.drawn === before.drawn && now.saved === before.saved;
+    if (isFilled && isKnown) return;
+    isFilled = true;
     isOutdated = true;
     clearTimeout(timer);
     timer = setTimeout(fillAll, now.drawn === before.drawn ? 0 : AFTER_MS);

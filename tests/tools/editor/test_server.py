@@ -275,10 +275,27 @@ def test_it_does_not_start_open_to_the_network(tmp_path: Path, options: list[str
     assert says in done.stderr
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    done = command.run(COMMAND, "edit", str(tmp_path / "none.toml"))
+@pytest.mark.parametrize("name", ["none/cell.toml", "."])
+def test_a_file_that_can_not_be_begun_is_named(tmp_path: Path, name: str) -> None:
+    done = command.run(COMMAND, "edit", str(tmp_path / name))
     assert done.returncode == 1
-    assert "none.toml" in done.stderr
+    assert "there is no such file" in done.stderr
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_a_file_that_is_not_there_is_begun_with_a_page(tmp_path: Path) -> None:
+    file = tmp_path / "robot_cell.toml"
+    for _ in range(2):  # what no one has written is not offered again
+        editor = EditorServer(file)
+        try:
+            assert file.read_text() == ""
+            state = editor.state()
+            assert (state["faults"], state["saved"], state["recovered"]) == (0, False, False)
+            text = editor.http.get("/text").text
+            assert text.startswith('title = "Robot cell"\n')
+            assert editor.http.get("/preview/").status_code == 200
+        finally:
+            editor.end()
 
 
 def test_pages_of_several_robots_are_drawn_below_their_paths(tmp_path: Path) -> None:
