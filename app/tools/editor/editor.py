@@ -44,6 +44,7 @@ class Editor:
         self.robots = RobotList(preview.robot_place)
         self.language = language
         self.checked: Checked = NOT_CHECKED
+        self._is_whole = False  # whether the preview has shown a panel without faults
         self.browsers: dict[str, Browser] = {}
         self._checker = checker
         self._numbers = 0
@@ -125,11 +126,15 @@ class Editor:
         return change
 
     def show(self) -> None:
-        """Checks the document, and shows its panel if it has no fault."""
+        """Checks the document, and shows its panel if it has no fault. A file that has had faults ever
+        since it was opened is shown without the faulty tables."""
         document = self.document
         self.checked = self._checker.check(document)
         if self.checked.panel is not None:
             self.preview.show(self.checked.panel, document.tables)
+            self._is_whole = True
+        elif not self._is_whole and (drawable := self._checker.drawable(document)):
+            self.preview.show(drawable.panel, drawable.tables)
         self.notify()
 
     def repairs(self) -> Iterator[Repair | None]:

@@ -13,7 +13,7 @@ from app.system.texts.locales import own_name
 from app.tools.editor.adding import parts_pane, pick_pane, robot_pane
 from app.tools.editor.document import DiffLine
 from app.tools.editor.editor import Editor, Part, PartRequest
-from app.tools.editor.forms import FormPage, Link, form_context, form_of, table_path
+from app.tools.editor.forms import FormPage, Link, RobotNames, form_context, form_of, table_path
 from app.tools.editor.merge_page import merge_page, recovered_page
 from app.tools.editor.outline import outline
 from app.tools.editor.paths import (
@@ -230,6 +230,7 @@ def _form(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
         tables,
         path,
         interfaces=_interfaces(editor),
+        robot=_robot_names(editor, at(tables, path)),
         faults=editor.checked.faults,
         language=request.language,
         pictures=_pictures(editor),
@@ -257,6 +258,22 @@ def _users(editor: Editor, path: Path) -> Iterator[Link]:
     }
     for table, key in keys.items():
         yield Link(table, title_of(at(tables, table)) or kind_of(tables, table), key)
+
+
+def _robot_names(editor: Editor, table: Any) -> RobotNames:
+    """What is on the robot, with the newest values of the topic that a table names."""
+    robots = editor.robots
+    robots.look()
+    rows = robots.rows(editor.preview.panel)
+    topic = table.get("topic") if isinstance(table, Mapping) else None
+    values = robots.field_values(topic, editor.preview.panel) if isinstance(topic, str) else {}
+    return RobotNames(
+        topics={row.name: row.type for row in rows["topics"]},
+        services={row.name: row.type for row in rows["services"]},
+        actions={row.name: row.type for row in rows["actions"]},
+        nodes=robots.nodes,
+        values={(str(topic), field): value for field, value in values.items()},
+    )
 
 
 def _interfaces(editor: Editor) -> Interfaces | None:

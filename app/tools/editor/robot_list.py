@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Any, Final, Literal, get_args
 
 from app.panel import Panel
@@ -24,7 +24,8 @@ from app.ros.graph.model import (
     TopicEndpoint,
 )
 from app.ros.graph.node_services import NodeParameter, NodeServices
-from app.ros.messages import Interfaces, load_interfaces
+from app.ros.messages import Interfaces, Type, load_interfaces
+from app.ros.messages.definitions import attribute_name
 from app.ros.messages.validation import format_value
 from app.system.errors import DecodeError, KioskError
 from app.system.texts import TextLike, say
@@ -44,6 +45,7 @@ PARAMETERS_EVERY_S: Final = 30.0
 MOST_LISTENED: Final = 1_000
 LARGEST: Final = 20_000  # bytes of a message whose value is shown
 ARRIVALS: Final = 4  # of a topic, by which its period is known
+MOST_FIELDS: Final = 60  # of a message whose values a form shows
 MAX_TEXT: Final = 24  # characters of a value
 # Types whose messages are large or have no value that a line can show.
 NOT_LISTENED: Final = frozenset(
@@ -243,6 +245,21 @@ class RobotList:
             topic.name: self.value(topic, interfaces) for topic in topics if topic.name in self._latest
         }
 
+    @property
+    def nodes(self) -> Sequence[str]:
+        """The names of the robot's nodes."""
+        return [node.name for node in self.robot.nodes] if self.robot else []
+
+    def field_values(self, name: str, panel: Panel | None) -> Mapping[str, str]:
+        """The newest values of a topic's plain fields, by their paths."""
+        interfaces = self._interfaces(panel)
+        topic = next((t for t in (self.robot.topics if self.robot else ()) if t.name == name), None)
+        message = topic and self.sample(topic, interfaces)
+        if topic is None or message is None:
+            return {}
+        values = fields_of(message, Type(topic.type), interfaces)
+        return dict(islice(values, MOST_FIELDS))
+
     def value(self, topic: SurveyedTopic, interfaces: Interfaces) -> TextLike:
         """The newest value of a topic as a line shows it."""
         message = self.sample(topic, interfaces)
@@ -335,6 +352,20 @@ def value_text(message: Any, type_name: str, interfaces: Interfaces) -> TextLike
     if isinstance(value, float) and shown.scale != 1.0:
         value *= shown.scale
     return short(value)
+
+
+def fields_of(
+    message: Any, kind: Type, interfaces: Interfaces, place: str = ""
+) -> Iterator[tuple[str, str]]:
+    """(path, value) of each plain field of a message, those of messages in it too, but no lists."""
+    for part in interfaces.structures[kind.name].fields:
+        value = getattr(message, attribute_name(part.name), None)
+        if part.type.container != "one":
+            continue
+        if part.type.is_nested and part.type.name in interfaces.structures:
+            yield from fields_of(value, part.type, interfaces, f"{place}{part.name}.")
+        else:
+            yield f"{place}{part.name}", short(value)
 
 
 def short(value: Any) -> str:

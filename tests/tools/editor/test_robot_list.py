@@ -10,9 +10,10 @@ import pytest
 
 from app.panel import Panel, load_panel
 from app.panel.layout import Frame
+from app.ros.messages import Type, load_interfaces
 from app.system.settings import shipped_path
 from app.system.texts import render
-from app.tools.editor.robot_list import RobotList, Row, short
+from app.tools.editor.robot_list import RobotList, Row, fields_of, short
 from app.tools.robot.link import Place
 from app.tools.simulator.in_process import in_process
 from tests.support.places import SHIPPED
@@ -126,3 +127,14 @@ def test_words_filter_rows() -> None:
     line = Row("/air", "/air", "std_msgs/msg/Float64", "plc", "", ())
     assert line.matches("AIR plc")
     assert not replace(line, nodes="").matches("air plc")
+
+
+def test_plain_fields_of_a_message_have_their_paths() -> None:
+    interfaces = load_interfaces("jazzy")
+    kind = "geometry_msgs/msg/PoseStamped"
+    fields = {"header": {"frame_id": "map"}, "pose": {"position": {"x": 1.25}}}
+    message = interfaces.decode(kind, interfaces.encode(kind, fields))
+    values = dict(fields_of(message, Type(kind), interfaces))
+    assert values["header.frame_id"] == "map"
+    assert values["pose.position.x"] == "1.25"
+    assert values["header.stamp.sec"] == "0"

@@ -306,3 +306,29 @@ def test_pages_of_several_robots_are_drawn_below_their_paths(tmp_path: Path) -> 
         assert page.status_code == 200
         assert "Another cell" in page.text
         assert "/preview/robots/right/" in page.text
+
+
+FAULTY = PANEL.replace('kind = "readout"\nlabel = "Speed"', 'kind = "reedout"\nlabel = "Speed"')
+
+
+def test_a_faulty_file_is_drawn_without_the_faulty_tables(tmp_path: Path) -> None:
+    assert FAULTY != PANEL
+    with editing(tmp_path, FAULTY) as editor:
+        assert editor.state()["faults"] == 1
+        page = editor.http.get("/preview/pages/cell").raise_for_status().text
+        assert 'id="at-ready"' in page
+        assert 'id="at-speed"' not in page
+        editor.edit({"op": "text", "path": [], "text": PANEL}).raise_for_status()
+        assert 'id="at-speed"' in editor.http.get("/preview/pages/cell?drawn=2").text
+        # From now on a fault leaves the last whole panel.
+        editor.edit({"op": "text", "path": [], "text": FAULTY}).raise_for_status()
+        assert 'id="at-speed"' in editor.http.get("/preview/pages/cell?drawn=2").text
+
+
+def test_a_form_has_the_names_and_values_of_the_robot(tmp_path: Path) -> None:
+    with editing(tmp_path) as editor:
+        path = '["page", 0, "group", 0, "widget", 0]'
+        until(lambda: "now" in editor.part("form", path=path), "the newest value of /speed")
+        html = editor.part("form", path=path)
+        assert 'value="/gripper/open"' not in html
+        assert 'value="/load"' in html
