@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.browser.test_accessibility import violations
 from tests.support.browser.finger import Touch
@@ -118,6 +118,26 @@ def test_a_goal_is_set_and_sent_by_keys_alone(shuttle: Server, page: Page) -> No
     page.keyboard.press("Enter")
     expect(receipt(page)).to_contain_text("x ")
     assert chosen(page) == ""
+
+
+def test_the_crosshair_is_offered_once_the_map_is_shown(shuttle: Server, page: Page) -> None:
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    page.route("**/map/*/*.png*", hold)
+    page.goto(shuttle.url)
+    hall, view = widget(page, "hall"), page.locator(".map-view")
+    expect(page.locator(".map-goal")).to_be_attached()  # the scripts of places are there
+    until(lambda: page.evaluate(DRAWN) and held, "a tile of the map is asked for")
+    view.focus()
+    page.keyboard.press("Enter")
+    expect(view).to_have_attribute("role", "img")
+    assert hall.get_attribute("data-crosshair") is None
+    for route in held:
+        route.continue_()
+    begin_by_keys(page)
 
 
 def test_keys_move_the_crosshair_by_steps_and_the_map_at_its_edge(shuttle: Server, page: Page) -> None:
