@@ -161,6 +161,17 @@ def test_keys_move_the_crosshair_by_steps_and_the_map_at_its_edge(shuttle: Serve
         page.keyboard.press("ArrowRight")
     view = place(page.locator(".map-view"))
     assert x() <= view["x"] + view["width"] - 20
+    said = widget(page, "hall").locator(".map-crosshair")
+    expect(said).not_to_have_text("")
+    for _ in range(30):
+        page.keyboard.press("ArrowUp")
+
+    def is_below() -> bool:
+        page.evaluate(DRAWN)
+        words, box = place(said), place(mark)
+        return bool(box["y"] + box["height"] / 2 > words["y"] + words["height"])
+
+    until(is_below, "what is said does not cover it")
 
 
 def test_nothing_chosen_is_nothing_sent(shuttle: Server, page: Page) -> None:

@@ -9,7 +9,7 @@ import { find } from "../show.js";
 const STEP_MM = 20;
 const FINE_MM = 2;
 const TURN_RAD = Math.PI / 12; // 15 degrees
-const EDGE_PX = 24; // of the view, which moves the map
+const EDGE_PX = 48; // of the view, which moves the map: the arrow is within it
 const REST_MS = 300;
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -83,7 +83,14 @@ export class Crosshair {
     const px = mm * Number.parseFloat(getComputedStyle(this.#map).getPropertyValue("--mm"));
     const metres = px / this.#view.perMetre;
     this.#show([x + right * metres, y - down * metres, yaw]);
-    this.#view.bring(this.#pose[0], this.#pose[1], EDGE_PX);
+    this.#bring();
+  }
+
+  // Into the view, below what is said.
+  #bring() {
+    if (!this.#pose) return;
+    const said = this.#line.textContent ? this.#line.offsetTop + this.#line.offsetHeight : 0;
+    this.#view.bring(this.#pose[0], this.#pose[1], EDGE_PX, said - find(this.#map, ".map-view").offsetTop);
   }
 
   /** @param {number} angle */
@@ -115,6 +122,7 @@ export class Crosshair {
     /** @type {Record<string, string>} */
     const parts = { "{x}": text(x, 2), "{y}": text(y, 2), "{degrees}": text(degrees, 0) };
     this.#line.textContent = this.#text("at").replace(/\{\w+\}/g, (name) => parts[name] ?? name);
+    this.#bring();
   }
 
   #set() {

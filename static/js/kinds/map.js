@@ -183,14 +183,15 @@ export class MapView {
     return { ...this.#centre };
   }
 
-  // Moves the map so far that a point of it, in metres, is at least `margin` pixels within the view.
-  /** @param {number} x @param {number} y @param {number} margin */
-  bring(x, y, margin) {
+  // Moves the map so far that a point of it, in metres, is at least `margin` pixels within the view, and
+  // below what covers `top` of it.
+  /** @param {number} x @param {number} y @param {number} margin @param {number} top */
+  bring(x, y, margin, top) {
     const { clientWidth, clientHeight } = this.#view;
     const at = this.at(x, y);
-    const inside = (/** @type {number} */ part, /** @type {number} */ size) =>
-      Math.min(Math.max(part, margin), size - margin) - part;
-    const [right, down] = [inside(at.x, clientWidth), inside(at.y, clientHeight)];
+    const inside = (/** @type {number} */ part, /** @type {number} */ from, /** @type {number} */ size) =>
+      Math.min(Math.max(part, from + margin), size - margin) - part;
+    const [right, down] = [inside(at.x, 0, clientWidth), inside(at.y, Math.max(top, 0), clientHeight)];
     if (right || down) this.#pan(right, down);
   }
 
