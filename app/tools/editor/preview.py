@@ -7,12 +7,12 @@ received: a page is drawn from it at once after an edit, and the sessions follow
 
 import asyncio
 import logging
+import shutil
 from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack, ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from starlette.datastructures import MutableHeaders, QueryParams
@@ -36,6 +36,7 @@ from app.system.concurrency import keep_running
 from app.system.settings import Settings, shipped_path
 from app.system.texts import render, say
 from app.system.used_certificates import UsedCertificates
+from app.tools.editor.temporary_folder import TemporaryFolder
 from app.tools.robot.link import Place
 from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
@@ -95,12 +96,12 @@ class Preview:
         self.number = 0  # of the newest panel, from 1
         self.on_live: Callable[[], None] = lambda: None
         self._path = path
-        self._folder = TemporaryDirectory(prefix="operator-panel-edit-")
+        self._folder = TemporaryFolder()
         self._settings = replace(
             settings,
             panel=path,
             mode="live" if is_live else "demo",
-            data=Path(self._folder.name),
+            data=self._folder.path,
             root_path=ROOT,
             dev=False,
         )
@@ -124,6 +125,7 @@ class Preview:
         return new_application(self._settings, EmbedRules())
 
     async def start(self) -> None:
+        self._folder.create()
         await self._access.reload()
         self._following = keep_running(self._follow, log, "the preview's sessions failed")
 
@@ -137,7 +139,7 @@ class Preview:
         await asyncio.gather(*self._ended, return_exceptions=True)
         await self._doctor.stop()
         self._access.close()
-        self._folder.cleanup()
+        self._folder.remove()
 
     @property
     def panel(self) -> Panel | None:
@@ -311,6 +313,7 @@ class Preview:
         folder = self._settings.data_folder("demo")
         own = folder / f"panel-{number}"
         own.mkdir()
+        closing.callback(shutil.rmtree, own, ignore_errors=True)
         closing.push_async_callback(fleet.stop)
         await fleet.alarms.start(own, self._log, UsedCertificates([], None))
         closing.push_async_callback(fleet.alarms.stop)
