@@ -62,7 +62,7 @@ def _about(rows: Sequence[Row]) -> TextLike:
 def parts_pane(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     def described(table: str) -> str:
         words = WORDS["tables"]
-        return str(words.get(table) or words[f"{table}_widget"]).replace("`", "")
+        return str(words.get(f"{table}_widget") or words[table]).replace("`", "")
 
     families = [(FAMILY_NAMES[name], kinds) for name, kinds in FAMILIES.items()]
     return "_parts.html", {
