@@ -1,18 +1,23 @@
 """`make screenshots`: the examples, the shipped panel and the gallery at all sizes, in all themes and
-languages, into build/screenshots; the README's pictures into docs/images. All of the demo robot."""
+languages, into build/screenshots; the pictures of README and documentation into docs/images. All of the
+demo robot. `--editor`: only those of the editor."""
 
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from shutil import copy
+from tempfile import TemporaryDirectory
 from typing import Final
 
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
 from app.panel import load_panel
 from app.web.pages.display_choice import CHOICES, COOKIE
+from tests.support.editor import EditorServer, box_of, middle, preview
 from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, SHIPPED, Server, until
 
 EXAMPLE: Final = ROOT / "docs/examples/palletizer.toml"
@@ -35,6 +40,8 @@ CYCLE_MS: Final = 60_000  # a state of the demo robot comes within this time
 LOADED_MS: Final = 200  # scripts and values are there
 RECEIPTS_S: Final = 12.0  # the cell has placed a box
 COLOURS: Final = 96
+EDITOR_SIZE: Final[ViewportSize] = {"width": 1440, "height": 900}
+DRAWN_S: Final = 4.0  # the editor has its preview's sessions again after an edit
 SETTLED_S: Final = 0.8  # a press is acknowledged and its highlight gone
 
 
@@ -42,6 +49,10 @@ def main() -> None:
     ALL.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS)
+        take_for_editor(browser)
+        if "--editor" in sys.argv:
+            browser.close()
+            return
         for name, panel in PANELS.items():
             with running(panel) as server:
                 loaded = load_panel(panel)
@@ -134,6 +145,44 @@ def take_for_readme(browser: Browser, url: str) -> None:
     expect(page.locator("[data-widget=steps]")).to_have_attribute("data-mode", "recovery")
     picture(page, "locked.png")
     page.close()
+
+
+def take_for_editor(browser: Browser) -> None:
+    """The editor with a changed label, with what a topic can be shown as, and with a line that another
+    program has changed too."""
+    with TemporaryDirectory() as folder:
+        file = Path(copy(EXAMPLE, Path(folder) / "cell1.toml"))
+        editor = EditorServer(file)
+        page = browser.new_page(viewport=EDITOR_SIZE)
+        try:
+            page.goto(editor.address)
+            page.locator("#tab-robot").click()
+            expect(page.locator('[data-item*="/vacuum"]').first).to_be_visible(timeout=CYCLE_MS)
+            preview(page).locator("[data-widget=boxes]").wait_for()
+            page.mouse.click(*middle(box_of(page, "[data-widget=boxes]")))
+            label = page.get_by_role("textbox", name="Label").first
+            label.fill("Count")
+            label.press("Enter")
+            expect(page.locator("#diff")).to_contain_text("Count")
+            page.mouse.move(0, 0)
+            page.wait_for_timeout(1000 * DRAWN_S)
+            picture(page, "editor.png")
+
+            page.locator('[data-item*="/air_pressure"]').first.click()
+            expect(page.locator("#ask")).to_be_visible()
+            page.wait_for_timeout(1000 * SETTLED_S)
+            picture(page, "editor-pick.png")
+            page.keyboard.press("Escape")
+
+            file.write_text(file.read_text().replace('en = "Boxes"', 'en = "Cartons"', 1))
+            expect(page.locator("#conflict")).to_be_visible(timeout=CYCLE_MS)
+            page.locator("#conflict").click()
+            expect(page.locator("#merge")).to_be_visible()
+            page.wait_for_timeout(1000 * SETTLED_S)
+            picture(page, "editor-merge.png")
+        finally:
+            page.close()
+            editor.end()
 
 
 def picture(page: Page, name: str) -> None:

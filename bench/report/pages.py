@@ -24,7 +24,7 @@ README_PEERS: Final[Mapping[str, tuple[str, str]]] = {
 }
 NOT_MEASURED: Final[Mapping[str, str]] = {
     "Foxglove, Lichtblick": "3-D, maps, plots of anything",
-    "FUXA": "13 languages, an editor, PLC protocols",
+    "FUXA": "13 languages, PLC protocols",
     "hand-made Qt or Tauri screen": "full control of the design, no browser",
 }
 COMPARISON_PEERS: Final[Mapping[str, str]] = {

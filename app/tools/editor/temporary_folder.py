@@ -15,8 +15,8 @@ LOCKED_WITHIN_S: Final = 60.0  # after it was made
 
 
 class TemporaryFolder:
-    """The folder is there from `create` to `remove`. It is locked for that time, so that the next process
-    can remove what a killed one has left."""
+    """The folder is there from `create` to `remove`, and is locked for that time: the next process
+    removes what a killed one has left."""
 
     def __init__(self) -> None:
         self.path = Path(gettempdir()) / f"{PREFIX}{token_hex(8)}"
