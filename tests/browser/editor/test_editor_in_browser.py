@@ -185,9 +185,8 @@ def test_drag_moves_to_the_marked_place(desk: Page, editor: EditorServer) -> Non
 
 def test_a_handle_makes_wider(desk: Page, editor: EditorServer) -> None:
     select(desk, "#at-open", OPEN)
-    handle = desk.locator(".ring.chosen i").last.bounding_box()
+    handle = until(lambda: desk.locator(".ring.chosen i").last.bounding_box(), "its handle is shown")
     group = box_of(desk, '.group[data-group="1"]')
-    assert handle is not None
     desk.mouse.move(*middle(handle))
     desk.mouse.down()
     desk.mouse.move(group["x"] + group["width"] - 4, handle["y"] + 4, steps=6)
