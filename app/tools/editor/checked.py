@@ -2,9 +2,10 @@
 
 import hashlib
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path as FilePath
 from typing import Any, Final, NamedTuple
 
@@ -18,12 +19,18 @@ from app.tools.editor.paths import Tables, at, path_at
 from app.tools.editor.repairs import Repair, repair_of
 
 
-class Checked(NamedTuple):
-    """The panel, None with faults; faults and notes in the order of the file."""
+@dataclass(frozen=True)
+class Checked:
+    """The panel, None with faults; faults and notes in the order of the file. The notes are looked for
+    when they are asked for: an edit is shown before."""
 
     panel: Panel | None
     faults: Sequence[Remark] = ()
-    notes: Sequence[Remark] = ()
+    find_notes: Callable[[], Sequence[Remark]] = tuple
+
+    @cached_property
+    def notes(self) -> Sequence[Remark]:
+        return self.find_notes()
 
 
 class Drawable(NamedTuple):
@@ -54,7 +61,7 @@ class DocumentChecker:
             panel = self._checker.panel(file)
         except PanelError as error:
             return Checked(None, error.faults)
-        return Checked(panel, (), self._checker.notes(panel, file))
+        return Checked(panel, (), partial(self._checker.notes, panel, file))
 
     def drawable(self, document: Document) -> Drawable | None:
         """The panel of a faulty document without its faulty tables; None if nothing is left."""

@@ -2,9 +2,11 @@
 be undone. The lines that no edit speaks of stay as they are, byte for byte."""
 
 import tomllib
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
+from itertools import accumulate
 from pathlib import Path as FilePath
 from typing import Any, Final, Literal, NamedTuple
 
@@ -195,6 +197,31 @@ class State:
     unreadable: Fault | None = None
 
 
+class _Places:
+    """Where the sections of a state are. `starts` are their first lines, then that after the last."""
+
+    def __init__(self, state: State) -> None:
+        lines = (sum(section.lines) for section in state.sections)
+        self.starts = [*accumulate(lines, initial=1)]
+        self._own = {path: number for number, path in enumerate(state.paths)}
+        self._inside: defaultdict[Path, list[int]] = defaultdict(list)
+        for number, path in enumerate(state.paths):
+            for end in range(1, len(path) + 1):
+                self._inside[path[:end]].append(number)
+
+    def inside(self, path: Path) -> Sequence[int]:
+        """As `_inside`, for a path that is not empty."""
+        return self._inside.get(path, ())
+
+    def located(self, path: Path) -> tuple[int, Path]:
+        """As `_locate`."""
+        for end in range(len(path), -1, -1):
+            number = self._own.get(path[:end])
+            if number is not None:
+                return number, path[end:]
+        return 0, path
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     before: State
@@ -214,6 +241,7 @@ class Document:
         self._bom = text.startswith(BOM)
         self._state = _opened(text.removeprefix(BOM), {})
         self._text: str | None = None
+        self._places: _Places | None = None
         self.revision = 0
         self._done: list[Step] = []
         self._undone: list[Step] = []
@@ -282,7 +310,7 @@ class Document:
         return replace(step.change, revision=self.revision)
 
     def _show(self, state: State) -> None:
-        self._state, self._text = state, None
+        self._state, self._text, self._places = state, None, None
         self.revision += 1
 
     def get(self, path: Path) -> Any:
@@ -298,32 +326,29 @@ class Document:
         return first, last
 
     def _lines(self, path: Path) -> tuple[int, int]:
-        places = []
-        line = 1
-        host, rest = _locate(self._state.paths, path)
-        for number, section in enumerate(self._state.sections):
-            above, header, body, loose = section.lines
-            at = self._state.paths[number]
-            if at[: len(path)] == path and path:
-                newlines = above + header + body
-                end = line + newlines - (0 if section.text.endswith("\n") or loose else -1) - 1
-                places.append((line + above, max(end, line + above)))
-            elif number == host and rest:
-                start = line + above + header
-                spans = [
-                    span for inner, span in section.layout.spans.items() if inner[: len(rest)] == rest
-                ]
-                if spans:
-                    first, last = min(s.start for s in spans), max(s.end for s in spans)
-                    places.append(
-                        (
-                            start + section.body.count("\n", 0, first),
-                            start + section.body.count("\n", 0, last),
-                        )
-                    )
-            line += above + header + body + loose
+        if self._places is None:
+            self._places = _Places(self._state)
+        starts = self._places.starts
         if not path:
-            return 1, max(1, line - (1 if self.text.endswith("\n") else 0))
+            return 1, max(1, starts[-1] - (1 if self.text.endswith("\n") else 0))
+        places = []
+        for number in self._places.inside(path):
+            section = self._state.sections[number]
+            above, header, body, loose = section.lines
+            newlines = above + header + body
+            end = starts[number] + newlines - (0 if section.text.endswith("\n") or loose else -1) - 1
+            places.append((starts[number] + above, max(end, starts[number] + above)))
+        host, rest = self._places.located(path)
+        section = self._state.sections[host]
+        spans = [
+            span for inner, span in section.layout.spans.items() if rest and inner[: len(rest)] == rest
+        ]
+        if spans:
+            start = starts[host] + sum(section.lines[:2])
+            first, last = min(s.start for s in spans), max(s.end for s in spans)
+            places.append(
+                (start + section.body.count("\n", 0, first), start + section.body.count("\n", 0, last))
+            )
         if not places:
             raise EditError(say("edit_no_place", place=place_of(path)), path)
         return min(first for first, _ in places), max(last for _, last in places)
