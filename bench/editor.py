@@ -126,6 +126,7 @@ def shown(folder: Path) -> Iterator[tuple[EditorServer, Page]]:
             page.goto(editor.address)
             expect(page.frame_locator("#frames iframe:not(.coming)").locator("#at-w0")).to_be_visible()
             expect(page.locator("#frames")).to_have_attribute("data-live", "1")
+            expect(page.locator("#faults")).not_to_be_empty()  # all panes are there
             page.evaluate(WATCH)
             yield editor, page
             browser.close()
@@ -150,6 +151,7 @@ def widths(editor: EditorServer, page: Page) -> list[dict[str, float]]:
     box = page.frame_locator("#frames iframe:not(.coming)").locator("#at-w0").bounding_box()
     assert box is not None
     page.mouse.click(box["x"] + 5, box["y"] + 5)
+    expect(page.locator(".ring.chosen")).to_be_visible()
     page.locator("#overlay").focus()
     keys = ("Shift+ArrowLeft", "Shift+ArrowRight")
     return edits(editor, page, lambda number: page.keyboard.press(keys[number % 2]))

@@ -189,7 +189,8 @@ export function start() {
     askPlaces();
   });
   onState((now, before) => {
-    if (now.revision !== before.revision || now.faults !== before.faults) askPlaces();
+    const isDrawn = now.drawn !== before.drawn; // then they are asked for when the page is there
+    if (!isDrawn && (now.revision !== before.revision || now.faults !== before.faults)) askPlaces();
     else drawRings();
   });
   onSelect((path, from) => {

@@ -67,7 +67,13 @@ onState((now, before) => {
   get("status").textContent = now.status;
   get("undo").toggleAttribute("disabled", !now.undo);
   get("redo").toggleAttribute("disabled", !now.redo);
-  if (now.drawn !== before.drawn) panes.fill(get("pages"), "pages", shownLanguage());
+  if (now.drawn !== before.drawn) areKeysOld = true;
+});
+
+let areKeysOld = false;
+preview.onDrawn(() => {
+  if (areKeysOld) panes.fill(get("pages"), "pages", shownLanguage());
+  areKeysOld = false;
 });
 
 /** @returns {Record<string, string>} */
