@@ -158,7 +158,9 @@ def widths(editor: EditorServer, page: Page) -> list[dict[str, float]]:
 
 
 def labels(editor: EditorServer, page: Page) -> list[dict[str, float]]:
-    """A label is typed, and Enter pressed."""
+    """A label is typed, and Enter pressed, while the robot's topics are listed."""
+    page.get_by_role("tab", name="Robot").click()
+    expect(page.locator(".offer").nth(TOPICS - 1)).to_be_attached()
 
     def press(number: int) -> None:
         field = page.locator("#form").get_by_label("Label", exact=False).first
@@ -189,7 +191,8 @@ def main() -> None:
     for name, times in alone():
         print(_row(f"{name}, CPU time alone", times), flush=True)
     with tempfile.TemporaryDirectory() as folder, shown(Path(folder)) as (editor, page):
-        for way, measure in (("wider or narrower by a key", widths), ("a label and Enter", labels)):
+        ways = ("wider or narrower by a key", widths), ("a label, beside the topics", labels)
+        for way, measure in ways:
             rows = measure(editor, page)
             for part, name in PARTS.items():
                 asked = str(ASKED_MS) if part == "whole" else ""

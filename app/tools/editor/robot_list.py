@@ -109,6 +109,8 @@ class RobotList:
         self._wake = asyncio.Event()
         self.fault: str = ""  # why there is no robot
         self.version = 0  # of the rows: another number where there are others
+        self._panel: Panel | None = None  # that was asked for last, and what it uses
+        self._used: object = None
         self._names: object = None
         self.robot: RobotGraph | None = None
         self._below = ""
@@ -217,6 +219,16 @@ class RobotList:
         if known != self._names:
             self._names = known
             self.version += 1
+
+    def version_for(self, panel: Panel | None) -> int:
+        """The version of the rows, another one also where the panel uses others of them."""
+        if panel is not self._panel:
+            self._panel = panel
+            used = (uses_of(panel), panel.demo_story) if panel else None
+            if used != self._used:
+                self._used = used
+                self.version += 1
+        return self.version
 
     def rows(self, panel: Panel | None) -> Mapping[Section, Sequence[Row]]:
         """All rows by section; of a panel with a story, also what its simulated robot can play."""

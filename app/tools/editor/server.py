@@ -296,7 +296,9 @@ def _add_routes(app: FastAPI) -> None:
     async def robot_values(request: Request, editor: CurrentEditor) -> Response:
         editor.robots.look()
         values = editor.robots.values(editor.preview.panel)
-        return _json(request, {"values": values, "rows": editor.robots.version})
+        return _json(
+            request, {"values": values, "rows": editor.robots.version_for(editor.preview.panel)}
+        )
 
     @app.post("/undo")
     async def undo(request: Request, editor: CurrentEditor) -> Response:

@@ -32,7 +32,9 @@ async function fillAll() {
   isOutdated = false;
   clearTimeout(timer);
   await Promise.all([shown.refresh(), fill(faults, "faults"), fill(diff, "diff")]);
-  await fill(left, left.dataset.part ?? "outline");
+  // The robot's list asks by itself whether it has other rows; the kinds are always the same.
+  const name = left.dataset.part ?? "outline";
+  if (name === "outline") await fill(left, name);
 }
 
 /** @type {Map<HTMLElement, number>} */
