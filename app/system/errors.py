@@ -124,13 +124,16 @@ class PanelError(KioskError):
 
 
 class InterfaceError(KioskError):
-    """`source` is the interface file or folder at fault, or None. `package` is the missing package,
-    "interfaces" where no folder has any, or ""."""
+    """`source` is the interface file or folder at fault, or None. `package` is the missing package, or
+    "". Errors with the same `cause` (not "") are one mistake."""
 
-    def __init__(self, message: str, source: Path | None = None, package: str = "") -> None:
+    def __init__(
+        self, message: str, source: Path | None = None, package: str = "", cause: str = ""
+    ) -> None:
         super().__init__(message)
         self.source = source
         self.package = package
+        self.cause = cause
 
 
 class KindError(KioskError):

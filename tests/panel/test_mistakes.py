@@ -141,7 +141,12 @@ def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsO
     # Those are files beside the panel file; test_page_templates.py has them.
     assert list(lacking(together | {"robot": "r1"}, Page)) == ["template", "styles"]
     for kind, (model, *_) in KINDS.items():
-        own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
+        own: dict[str, Any] = {}
+        for key, value in (item for w in widgets if w["kind"] == kind for item in w.items()):
+            if isinstance(value, list) and isinstance(own.get(key), list):
+                own[key] = [*own[key], *value]
+            else:
+                own[key] = {**own.get(key, {}), **value} if isinstance(value, dict) else value
         own |= {"grow": True, "show_label": False, "robot": "r1"}  # of any kind, but of few widgets
         own |= {"needs": "operator"} if issubclass(model, Command) else {}
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
@@ -227,7 +232,7 @@ def one_each(faults_of: FaultsOf, mistakes: Mapping[int, str]) -> dict[int, Faul
 def test_a_value_that_is_of_no_use_is_one_fault(faults_of: FaultsOf, numbers: Sequence[int]) -> None:
     faults = one_each(faults_of, {n: f"{key_of(n)} = 1979-05-27" for n in numbers})
     for number, fault in faults.items():
-        own_id = key_of(number) in ("id", "same")
+        own_id = key_of(number) in ("id", "same") and WITH_ID.fullmatch(LINES[number - 2])
         assert fault.id == ("" if own_id else id_at(number)), str(fault)
         assert fault.place.endswith(key_of(number)), str(fault)
 

@@ -103,7 +103,9 @@ REFUSED: Final = {
     "table": on_page('kind = "table"\nlabel = "T"\nsource = "count"'),
 }  # fmt: skip
 # Those that read no one field.
-OF_TOPIC: Final = frozenset({"recipe.readback", "switch", "camera", "map", "map.pose", "log"})
+OF_TOPIC: Final = frozenset(
+    {"recipe.readback", "switch", "camera", "map", "map.pose", "map.robot_level", "log"}
+)
 
 
 def tables_with_source() -> Iterator[str]:

@@ -16,7 +16,7 @@ MOST: Final = 4  # paths that a fault proposes
 def type_fault(place: str, error: InterfaceError) -> Fault:
     """The fault of an unusable type. Its cause is the file, package or name, which several types may
     share."""
-    return Fault(place, str(error), cause=f"type {error.source or error.package or error}")
+    return Fault(place, str(error), cause=f"type {error.source or error.cause or error}")
 
 
 def way_faults(place: str, type_name: str, *, of_service: bool) -> Iterator[Fault]:

@@ -19,10 +19,9 @@ _CLAIM: Final = 'is not the name of a claim: it must be like "preferred_username
 # The rule of a text, by its key: each key with a pattern has a row.
 PATTERNS: Final[Mapping[str, str]] = {
     **dict.fromkeys(
-        ("id", "robot", "needs", "groups", "interlock", "page", "fields", "condition", "places", "map"),
-        NO_ID,
+        ("id", "robot", "needs", "groups", "interlock", "page", "fields", "condition", "places"), NO_ID
     ),
-    **dict.fromkeys(("alarms", "ack_command", "ack_input"), NO_ID),
+    **dict.fromkeys(("map", "level", "alarms", "ack_command", "ack_input"), NO_ID),
     **dict.fromkeys(("logo", "src", "picture"), _PICTURE),
     **dict.fromkeys(("password_env", "secret_env"), _VARIABLE),
     **dict.fromkeys(("user_claim", "groups_claim"), _CLAIM),

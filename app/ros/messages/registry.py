@@ -243,7 +243,8 @@ class Interfaces:
         hint = f"there is no package {package}: its folder must be among the panel's `interfaces`"
         hint += f", or did you mean {' or '.join(near)}?" if near else ""
         # Without any folder, all of them are absent for one reason.
-        return InterfaceError(f"{why}; {hint}", package=package if self._folders else "interfaces")
+        mistake = package if self._folders else "no folders"
+        return InterfaceError(f"{why}; {hint}", package=package, cause=mistake)
 
 
 def _suggestions(name: str, known: Sequence[str]) -> list[str]:

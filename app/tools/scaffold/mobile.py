@@ -98,6 +98,8 @@ def _layers(topics: Iterable[SurveyedTopic]) -> Iterator[tuple[SurveyedTopic, La
     """The topics that are drawn over the map, by their types and names; `MOST_ALIKE` of a kind."""
     published = sorted((topic for topic in topics if topic.publishers), key=lambda topic: topic.name)
     for name, kind in LAYERS.items():
+        if kind.is_mask:
+            continue  # which filter a mask is of, only a person knows
         word = LAYER_WORDS.get(name, "")
         alike = [
             topic for topic in published if topic.types == (kind.type,) and word in topic.name.lower()

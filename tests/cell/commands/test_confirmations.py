@@ -303,7 +303,7 @@ def panel_file(folder: Path, more: str) -> Path:
         ),
         (
             'confirm = { topic = "/s", type = "std_msgs/msg/Bool", equals = "{messag}" }',
-            'page[0].widget[2].confirm.equals: no input "messag"; there is fan, message',
+            'page[0].widget[2].confirm.equals: no input "messag"; did you mean "message"?',
         ),
         (
             'confirm = { topic = "/s", type = "std_msgs/msg/Bool", field = "dat", equals = true }',
