@@ -36,7 +36,8 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "tools": (
         ("cell_config", "doctor", "install", "kiosk", "simulator"),
-        ("robot", "scaffold"),
+        ("scaffold",),
+        ("robot",),
         ("editor",),
         ("cli",),
     ),

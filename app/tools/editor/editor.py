@@ -48,15 +48,22 @@ class Editor:
         self.browsers: dict[str, Browser] = {}
         self._checker = checker
         self._numbers = 0
+        self._begun = ""  # the text of a new file
         preview.on_live = self.notify
 
     @property
     def document(self) -> Document:
         return self.session.document
 
+    @property
+    def is_new(self) -> bool:
+        """Whether the file has nothing yet but the empty page with which it was begun."""
+        return not self.session.base_text.strip() and self.document.text in ("", self._begun)
+
     def begin(self) -> None:
         """Shows the file. An empty one is begun with a page, as a change that is not saved."""
-        session, text = self.session, empty_text(label_of(self.session.path.stem))
+        session = self.session
+        text = self._begun = empty_text(label_of(session.path.stem))
         if session.recovered is not None and session.recovered.text == text:
             session.drop_recovered()
         if session.recovered is not None or self.document.text.strip():
@@ -166,6 +173,7 @@ class Editor:
             "drawn": self.preview.number,
             "live": self.preview.live_number,
             "saved": is_saved,
+            "new": self.is_new,
             "status": status,
             "undo": document.undo_label is not None,
             "redo": document.redo_label is not None,

@@ -28,6 +28,7 @@ from app.tools.editor.paths import (
 )
 from app.tools.editor.places import page_of, places_on
 from app.tools.editor.repairs import Repair
+from app.tools.editor.start import start_pane
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 THEMES: Final = (
@@ -65,6 +66,7 @@ WORDS: Final = {
     "pages_of_panel": say("editor_pages_of_panel"),
     "conflict": say("editor_conflict"),
     "lost": say("editor_lost"),
+    "start": say("editor_start"),
 }
 
 
@@ -323,4 +325,5 @@ PARTS: Final[Mapping[str, Part]] = {
     "robot": robot_pane,
     "parts": parts_pane,
     "pick": pick_pane,
+    "start": start_pane,
 }

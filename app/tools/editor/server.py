@@ -33,6 +33,8 @@ from app.tools.editor.paths import path_of
 from app.tools.editor.preview import ROOT as PREVIEW
 from app.tools.editor.preview import Preview
 from app.tools.editor.session import EditSession
+from app.tools.editor.start import Start, started
+from app.tools.robot.link import Place
 from app.web.asgi import Application
 from app.web.assets import FONTS, Asset, asset
 from app.web.language import MOST_ACCEPTED, negotiated
@@ -140,7 +142,7 @@ def editor_app(
     app.state.editor = editor
     app.state.files, app.state.revision = _files()
     app.state.templates = PageTemplates(shipped_path("templates"))
-    _add_routes(app)
+    _add_routes(app, settings)
     app.router.routes.append(Mount(PREVIEW, app=preview))
     app.add_exception_handler(KioskError, _on_error)
     app.add_middleware(TokenGuard, token=token, cookie=f"{COOKIE}_{port}")
@@ -235,7 +237,7 @@ def _files() -> tuple[Mapping[str, Asset], str]:
     return files, digest.hexdigest()[:12]
 
 
-def _add_routes(app: FastAPI) -> None:
+def _add_routes(app: FastAPI, settings: Settings) -> None:
     @app.get("/", response_class=HTMLResponse)
     async def page(request: Request, editor: CurrentEditor) -> Response:
         language = language_of(request)
@@ -325,6 +327,12 @@ def _add_routes(app: FastAPI) -> None:
             return _step(request, editor, editor.take_recovered)
         editor.drop_recovered()
         return _json(request, editor.state(""))
+
+    @app.post("/start")
+    async def start(posted: Start, request: Request, editor: CurrentEditor) -> Response:
+        change, page = await started(editor, posted, Place(zenoh=settings.zenoh))
+        answer = {"revision": change.revision, "drawn": editor.preview.number}
+        return _json(request, answer | {"select": change.select, "page": page})
 
     @app.get("/places")
     async def places(request: Request, editor: CurrentEditor, page: str = "") -> Response:

@@ -7,6 +7,7 @@ import * as outline from "./outline.js";
 import * as panes from "./panes.js";
 import * as preview from "./preview.js";
 import { select } from "./selection.js";
+import * as starting from "./start.js";
 import { edit, onMessage, onState, open, step } from "./wire.js";
 
 /** @param {string} id */
@@ -91,22 +92,8 @@ get("pages").addEventListener("click", (event) => {
   const target = event.target instanceof Element ? event.target : null;
   const key = target?.closest("[data-page]");
   if (key?.dataset.page) preview.showPage(key.dataset.page);
-  const add = target?.closest("[data-add-page]");
-  if (add) addPage(add.textContent?.trim() ?? "");
+  if (target?.closest("[data-add-page]")) starting.ask();
 });
-
-// At the end, with the first id that is free.
-/** @param {string} title */
-async function addPage(title) {
-  const ids = new Set([...get("pages").querySelectorAll("[data-page]")].map((key) => key.dataset.page));
-  let number = ids.size + 1;
-  while (ids.has(`page_${number}`)) number += 1;
-  const value = { id: `page_${number}`, title: `${title} ${number}` };
-  const answer = await edit([{ op: "insert", path: ["page", ids.size], value }]);
-  if (!answer?.select) return;
-  select(answer.select, "edit");
-  preview.showPage(value.id);
-}
 
 // The editor itself is light or dark as its reader's system is.
 const isDark = matchMedia("(prefers-color-scheme: dark)");
@@ -148,4 +135,5 @@ arrange.start();
 change.start();
 merge.start();
 adding.start();
+starting.start();
 open();

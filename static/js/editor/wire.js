@@ -8,6 +8,7 @@
  * @property {number} drawn The number of the panel that pages are drawn from.
  * @property {number} live The number of the panel whose sessions run.
  * @property {boolean} saved
+ * @property {boolean} new Whether the file has nothing yet but an empty page.
  * @property {string} status
  * @property {boolean} undo
  * @property {boolean} redo
@@ -34,6 +35,7 @@ export let state = {
   drawn: 0,
   live: 0,
   saved: true,
+  new: false,
   status: "",
   undo: false,
   redo: false,
@@ -162,6 +164,12 @@ export function pasteText(path, text) {
 /** @param {Record<string, unknown>} addition */
 export function add(addition) {
   return inTurn(() => post("/add", { revision: state.revision, ...addition }));
+}
+
+// Starts the file, or a page; the answer has a `message` if it was refused.
+/** @param {Record<string, unknown>} choice */
+export function start(choice) {
+  return inTurn(async () => (await send("/start", JSON.stringify({ ...choice, revision: state.revision }))).answer);
 }
 
 /** @param {"undo" | "redo" | "save"} name */

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -218,6 +219,7 @@ def test_pages_sizes_languages_and_themes(desk: Page) -> None:
 
 def test_a_page_is_added_at_the_end(desk: Page, editor: EditorServer) -> None:
     desk.locator("#pages .add").click()
+    desk.get_by_role("button", name="An empty page").click()
     expect(desk.locator("#pages [data-page='page_3']")).to_have_attribute("aria-current", "page")
     assert editor.http.get("/text").text.endswith('[[page]]\nid = "page_3"\ntitle = "Page 3"\n')
     expect(preview(desk).locator("nav.pages [aria-current]")).to_have_text("Page 3")
@@ -358,3 +360,25 @@ def test_a_picture_is_chosen_and_shown(desk: Page) -> None:
     desk.locator("#undo").click()
     desk.locator("#undo").click()
     expect(preview(desk).locator("#at-speed img")).to_have_count(0)
+
+
+def test_a_new_file_and_a_page_of_another_are_chosen_by_keys(page: Page, tmp_path: Path) -> None:
+    (tmp_path / "other.toml").write_text(PANEL)
+    editor = EditorServer(tmp_path / "new.toml")
+    try:
+        page.goto(editor.address)
+        expect(page.locator("#start-from")).to_be_visible()
+        page.locator("#start-from").press("Enter")
+        expect(page.get_by_role("button", name="The robot that is there")).to_be_focused()
+        page.get_by_role("button", name="other.toml: Cell").press("Enter")
+        expect(preview(page).locator("#at-speed")).to_be_visible()
+        expect(page.locator("#start-from")).to_be_hidden()
+        page.locator("#pages .add").click()
+        page.get_by_role("button", name="other.toml: Watch").click()
+        expect(preview(page).locator("#at-load")).to_be_visible()
+        expect(page.locator("#pages [aria-current]")).to_have_text("Watch")
+        page.keyboard.press("Control+s")
+        expect(page.locator("#status")).to_have_text("Saved")
+        assert 'id = "watch"' in editor.file.read_text()
+    finally:
+        editor.end()

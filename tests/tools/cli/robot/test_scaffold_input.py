@@ -2,6 +2,7 @@
 published, from when their messages arrived."""
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,13 @@ from app.ros.graph.model import (
     SurveyedTopic,
     TopicEndpoint,
 )
-from app.tools.cli.robot.scaffold import MOST_ROBOTS, Heard, _base, read_scaffold_input, usable
+from app.tools.robot.scaffold import (
+    MOST_ROBOTS,
+    Heard,
+    read_scaffold_input,
+    scaffold_base,
+    usable,
+)
 from tests.support.builders import INTERFACES
 from tests.tools.cli.robot.test_link import place_below
 
@@ -76,7 +83,7 @@ def test_unusable_robots_do_not_prevent_a_scaffold() -> None:
 
 
 def test_robots_of_alike_namespaces_have_names_of_their_own() -> None:
-    draft = _base(place_below(""), graph_of("/cell1/arm", "/cell2/arm"), "/cell1/arm", None)
+    draft = scaffold_base(place_below(""), graph_of("/cell1/arm", "/cell2/arm"), "/cell1/arm", Path())
     assert [(robot["id"], robot["name"]) for robot in draft.robots] == [
         ("robot1", "Cell1 arm"),
         ("robot2", "Cell2 arm"),
