@@ -241,7 +241,8 @@ class Field:
 
     @property
     def sends(self) -> Sends:
-        return SENDS.get(self.control, "")
+        is_chosen_file = self.control == "file" and self.choices
+        return "json" if is_chosen_file else SENDS.get(self.control, "")
 
     @property
     def is_set(self) -> bool:

@@ -141,12 +141,16 @@ export class Form {
   /** @type {View} */
   #view = { view: "form", kind: "", pick: "" };
   #loads = 0;
+  /** @type {Promise<void>} */
+  #drawing = Promise.resolve();
   /** @type {Promise<unknown>} */
   #last = Promise.resolve();
   /** @type {Set<Entry>} what was refused, and stands as it was typed */
   #refused = new Set();
   /** @type {Map<Entry, string>} what is on its way */
   #sent = new Map();
+  /** @type {Map<HTMLElement, number>} lists to tick, with how many of their ticks are on their way */
+  #ticking = new Map();
   /** @type {Entry | null} */
   #composing = null;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -184,11 +188,18 @@ export class Form {
     return this.#last;
   }
 
-  // The pane as the server has it now.
-  async refresh() {
+  // The pane as the server has it now, or at a later refresh that has begun meanwhile.
+  refresh() {
+    this.#drawing = this.#draw();
+    return this.#drawing;
+  }
+
+  /** @returns {Promise<void>} */
+  async #draw() {
     const load = ++this.#loads;
     const html = await this.#host.load({ path: JSON.stringify(this.#path), ...this.#view });
-    if (html === null || load !== this.#loads) return;
+    if (load !== this.#loads) return this.#drawing;
+    if (html === null) return undefined;
     const fresh = document.createElement("div");
     fresh.innerHTML = html;
     for (const details of fresh.querySelectorAll("details[id]")) {
@@ -196,15 +207,27 @@ export class Form {
       if (there instanceof HTMLDetailsElement && this.#pane.contains(there))
         details.toggleAttribute("open", there.open);
     }
-    const hadFocus = this.#pane.contains(document.activeElement);
+    const focused = this.#pane.contains(document.activeElement) ? document.activeElement : null;
     const kept = { skips: (/** @type {Element} */ node) => isEntry(node) && this.#isTyped(node), stays: isRefusal };
     updateInPlace(this.#pane, fresh, kept);
     for (const entry of this.#entries()) if (!this.#isTyped(entry)) reset(entry);
-    for (const box of /** @type {NodeListOf<HTMLInputElement>} */ (this.#pane.querySelectorAll("[type=checkbox]")))
-      box.checked = box.defaultChecked;
+    for (const box of /** @type {NodeListOf<HTMLInputElement>} */ (this.#pane.querySelectorAll("[type=checkbox]"))) {
+      const group = near(box, "[data-sends=ticks]");
+      if (!group || !this.#ticking.has(group)) box.checked = box.defaultChecked;
+    }
     for (const entry of this.#refused) if (!entry.isConnected) this.#refused.delete(entry);
-    if (hadFocus && document.activeElement === document.body)
-      /** @type {HTMLElement | null} */ (this.#pane.querySelector(".form :is(input, select, button)"))?.focus();
+    if (focused && document.activeElement === document.body) this.#focusAgain(focused);
+    return undefined;
+  }
+
+  // A field that has another place keeps the focus, and what is being typed; without it the first has the focus.
+  /** @param {Element} before */
+  #focusAgain(before) {
+    const same = before.isConnected ? before : document.getElementById(before.id);
+    const found = same ?? this.#pane.querySelector(".form :is(input, select, button)");
+    if (same !== before && isEntry(same) && isEntry(before) && before.value !== known(before))
+      same.value = before.value;
+    if (found instanceof HTMLElement) found.focus({ preventScroll: same === found });
   }
 
   /** @returns {Entry[]} */
@@ -225,7 +248,10 @@ export class Form {
   #changed(target) {
     clearTimeout(this.#stepping);
     const group = near(target, "[data-sends=ticks]");
-    if (group) return this.#post(ticked(group), group);
+    if (group) {
+      this.#ticking.set(group, (this.#ticking.get(group) ?? 0) + 1);
+      return this.#post(ticked(group), group);
+    }
     if (target instanceof HTMLInputElement && target.dataset.upload && target.files?.[0]) {
       return this.#upload(target, target.files[0]);
     }
@@ -268,6 +294,9 @@ export class Form {
         if (posted.ok) this.#refused.delete(at);
         else this.#refused.add(at);
       }
+      const ticks = (this.#ticking.get(at) ?? 1) - 1;
+      if (ticks) this.#ticking.set(at, ticks);
+      else this.#ticking.delete(at);
       if (posted.ok) forgive(at);
       else refuse(at, posted.message ?? "");
       if (posted.ok && isEntry(at) && at.value === sent && !at.hasAttribute("data-by-edits")) settle(at);
