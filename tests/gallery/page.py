@@ -88,6 +88,7 @@ def _words() -> dict[str, Any]:
         "asks": {},
         "scopes": {},
         "stop_lost": "",
+        "place_crosshair_at": say("place_crosshair_at", x="{x}", y="{y}", degrees="{degrees}"),
         "lines": lambda _: LINES,
         "plot": sample_plot,
     }

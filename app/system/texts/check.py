@@ -1,11 +1,13 @@
-"""`python -m app.i18n`: checks each catalogue: whether it is complete, its translations have the
-placeholders of the English sentences, its language has a name, and the keypad has the decimal sign of
-its numbers.
+"""`python -m app.i18n`: checks each catalogue: whether it is complete and has each code once, its
+translations have the placeholders of the English sentences, its language has a name, and the keypad has
+the decimal sign of its numbers.
 
 Exit status: 0 without a fault, 1 with a line for each fault.
 """
 
+import re
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from string import Formatter
@@ -17,6 +19,7 @@ from app.system.texts.catalogue import ENGLISH, files, translations
 from app.system.texts.locales import own_name, symbols
 
 DECIMAL: Final = "keypad_decimal"
+_CODE: Final = re.compile(r'^msgid "(.+)"$', re.MULTILINE)
 
 
 def faults(catalogues: Mapping[str, Path]) -> Iterator[str]:
@@ -28,6 +31,8 @@ def faults(catalogues: Mapping[str, Path]) -> Iterator[str]:
         except (PoFileError, UnicodeDecodeError) as error:
             yield f"{path.name}: {error}"
             continue
+        codes = Counter(_CODE.findall(path.read_text(encoding="utf-8")))
+        yield from (f"{path.name}: {code} is there {n} times" for code, n in codes.items() if n > 1)
         yield from (
             f"{path.name}: {code} is not translated" for code in english if code not in translated
         )

@@ -198,6 +198,13 @@ def test_a_fault_of_a_translation_is_named(tmp_path: Path, changed: dict[str, st
     assert list(faults({ENGLISH: files()[ENGLISH], "de": path})) == [f"de.po: {fault}"]
 
 
+def test_a_code_that_is_there_twice_is_named(tmp_path: Path) -> None:
+    path = catalogue(tmp_path, "de", {**SENTENCES, "keypad_decimal": ","})
+    path.write_text(path.read_text() + '\nmsgid "keypad_decimal"\nmsgstr "."\n')
+    known = list(faults({ENGLISH: files()[ENGLISH], "de": path}))
+    assert "de.po: keypad_decimal is there 2 times" in known
+
+
 def test_a_catalogue_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     path = tmp_path / "de.po"
     path.write_bytes(b'msgid "ready"\nmsgstr "Gr\xfcn"\n')
