@@ -4,7 +4,7 @@ import { dropOfNew, showMark } from "./change.js";
 import { fill, onPane } from "./panes.js";
 import { shownPage } from "./preview.js";
 import { select, selection } from "./selection.js";
-import { add, part } from "./wire.js";
+import { add, get, part } from "./wire.js";
 
 /** @typedef {import("./wire.js").Path} Path */
 /** @typedef {{ at?: Path, on?: Path }} Target */
@@ -34,8 +34,8 @@ function filter() {
 
 async function refresh() {
   if (left.dataset.part !== "robot" || document.hidden) return;
-  const response = await fetch("/robot").catch(() => null);
-  if (!response?.ok) return;
+  const response = await get("/robot");
+  if (!response) return;
   const { values, rows: version } = await response.json();
   if (version !== rows) {
     rows = version;

@@ -1,7 +1,7 @@
 // Arrange: the overlay on the preview takes pointer and keyboard, and selects what the page shows.
 import { onDrawn, shownDocument, shownPage, shownScale, showPage } from "./preview.js";
 import { isAround, isSame, onSelect, select, selection } from "./selection.js";
-import { onState, state } from "./wire.js";
+import { get, onState, state } from "./wire.js";
 
 /** @typedef {import("./wire.js").Path} Path */
 /** @typedef {{ span: number, rows: number, columns: number }} Size */
@@ -52,8 +52,8 @@ export function pointOf(event) {
 
 async function askPlaces() {
   const turn = ++asked;
-  const response = await fetch(`/places?page=${encodeURIComponent(shownPage())}`);
-  if (!response.ok || turn !== asked) return;
+  const response = await get(`/places?page=${encodeURIComponent(shownPage())}`);
+  if (!response || turn !== asked) return;
   const answer = await response.json();
   ({ places, faulty } = answer);
   markSizes(answer.fits);

@@ -1,7 +1,7 @@
 // What is selected is changed where it stands: moved, made wider or higher, copied, deleted, by keys and by drag.
 import { boxOf, drawRings, placeAt, placeOf, pointOf, putAt, shownPlaces } from "./arrange.js";
 import { isAround, isSame, select, selection } from "./selection.js";
-import { edit, part, pasteText } from "./wire.js";
+import { edit, get, part, pasteText } from "./wire.js";
 
 /** @typedef {import("./wire.js").Path} Path */
 /** @typedef {import("./arrange.js").Place} Place */
@@ -98,8 +98,8 @@ async function doRemove(path) {
 
 /** @param {Path} path */
 async function copy(path) {
-  const response = await fetch(`/text?path=${encodeURIComponent(JSON.stringify(path))}`);
-  if (response.ok) await navigator.clipboard.writeText(await response.text());
+  const response = await get(`/text?path=${encodeURIComponent(JSON.stringify(path))}`);
+  if (response) await navigator.clipboard.writeText(await response.text());
 }
 
 // What is pasted comes after what is selected, or at the end of it.

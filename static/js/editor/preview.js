@@ -1,7 +1,7 @@
 // The preview: the panel's own page in a frame of a chosen size. After an edit it is drawn again at once from what the
 // server renders; when the sessions of the edited panel run, the frame is replaced by a live one.
 import { redraw } from "./redraw.js";
-import { onState, state } from "./wire.js";
+import { get, onState, state } from "./wire.js";
 
 const ROOT = "/preview";
 const COOKIE_S = 365 * 86_400;
@@ -121,8 +121,8 @@ async function loaded(made, number) {
 
 /** @param {string} query */
 async function rendered(query) {
-  const response = await fetch(address(query));
-  if (!response.ok) return null;
+  const response = await get(address(query));
+  if (!response) return null;
   return new DOMParser().parseFromString(await response.text(), "text/html");
 }
 

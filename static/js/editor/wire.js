@@ -182,8 +182,15 @@ export function tellSelection(path) {
   fetch("/selection", { method: "POST", headers: JSON_BODY, body: JSON.stringify({ browser, path }) }).catch(() => {});
 }
 
+// What the server answers; null if it refuses or can't be reached.
+/** @param {string} path */
+export async function get(path) {
+  const response = await fetch(path).catch(() => null);
+  return response?.ok ? response : null;
+}
+
 /** @param {string} name @param {Record<string, string>} query */
 export async function part(name, query) {
-  const response = await fetch(`/parts/${name}?${new URLSearchParams(query)}`);
-  return response.ok ? response.text() : null;
+  const response = await get(`/parts/${name}?${new URLSearchParams(query)}`);
+  return response?.text() ?? null;
 }

@@ -37,13 +37,15 @@ main {{ display: flex; flex-direction: column; width: 360px; height: 100vh; marg
 background: var(--surface) }}</style></head><body><header><h1>Form</h1></header><main></main>
 <script type="module">
 import {{ Form }} from "/static/js/editor/form.js";
+// A test may leave the page before an answer is there.
+const fetched = (...request) => fetch(...request).catch(() => new Promise(() => {{}}));
 const send = async (path, body) => {{
-  const response = await fetch(path, {{ method: "POST", body }});
+  const response = await fetched(path, {{ method: "POST", body }});
   return {{ ok: response.ok, ...(await response.json()) }};
 }};
 globalThis.form = new Form(document.querySelector("main"), {{
   post: (edits, label) => send("/edits", JSON.stringify({{ edits, label }})),
-  load: async (query) => (await fetch(`/parts/form?${{new URLSearchParams(query)}}`)).text(),
+  load: async (query) => (await fetched(`/parts/form?${{new URLSearchParams(query)}}`)).text(),
   select: (path) => globalThis.form.show(path),
   upload: (path, file) => send(`/upload?path=${{JSON.stringify(path)}}&name=${{file.name}}`, file),
 }});
