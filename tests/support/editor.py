@@ -9,7 +9,7 @@ from typing import Any
 
 import httpx
 from playwright.sync_api import Error as PlaywrightError
-from playwright.sync_api import FloatRect, FrameLocator, Page
+from playwright.sync_api import FloatRect, FrameLocator, Locator, Page, expect
 
 from tests.support.parts import until
 from tests.support.processes import command
@@ -138,6 +138,30 @@ def box_of(page: Page, selector: str) -> FloatRect:
 
 def middle(box: FloatRect) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def drag_line(page: Page, line: Locator, x: float, y: float) -> None:
+    """Drags a line of the panes "Robot" and "Parts" to a point of the window. The list comes again when
+    it has other rows: a line that goes at that moment is taken again."""
+    ghost = page.locator(".ghost")
+
+    def is_dragged() -> bool:
+        with suppress(PlaywrightError):
+            line.scroll_into_view_if_needed(timeout=1000)
+            box = line.bounding_box(timeout=1000)
+            if box is not None:
+                page.mouse.move(box["x"] + 60, box["y"] + 12)
+                page.mouse.down()
+                page.mouse.move(box["x"] + 80, box["y"] + 20)
+                page.mouse.move(x, y, steps=4)
+                if ghost.is_visible():
+                    return True
+                page.mouse.up()
+        return False
+
+    until(is_dragged, "a line is dragged")
+    page.mouse.up()
+    expect(ghost).to_have_count(0)
 
 
 @contextmanager

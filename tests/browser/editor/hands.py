@@ -12,7 +12,7 @@ from playwright.sync_api import Locator, Page, expect
 from app.panel.file.toml_lines import Path
 from app.system.toml_values import value_text
 from app.tools.editor.forms import element_id
-from tests.support.editor import EditorServer
+from tests.support.editor import EditorServer, drag_line
 from tests.support.parts import until
 
 LISTS: Final = ("group", "widget")  # tables with forms of their own
@@ -76,13 +76,7 @@ class Hands:
 
     def drop(self, line: Locator, x: float, y: float) -> None:
         """Drags a line of a pane to a point of the window."""
-        line.scroll_into_view_if_needed()
-        line.hover(position={"x": 60, "y": 12})
-        mouse = self.page.mouse
-        mouse.down()
-        mouse.move(x, y, steps=6)
-        expect(self.page.locator(".ghost")).to_be_visible()
-        mouse.up()
+        drag_line(self.page, line, x, y)
         self.actions += 1
 
     def pick(self, title: str) -> None:

@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, FloatRect, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
-from tests.support.editor import PANEL, EditorServer, box_of, editing, middle, preview
+from tests.support.editor import PANEL, EditorServer, box_of, drag_line, editing, middle, preview
 from tests.support.parts import until
 
 GUARDED: Final = (
@@ -75,27 +75,6 @@ def item(page: Page, tab: str, name: str) -> Any:
     return line
 
 
-def drag(page: Page, line: Any, x: float, y: float) -> None:
-    boxes: list[FloatRect] = []
-
-    def is_there() -> bool:
-        """The list comes again when there are other rows."""
-        line.scroll_into_view_if_needed()
-        box = line.bounding_box()
-        boxes.extend([box] if box else [])
-        return bool(box)
-
-    until(is_there, "the line is shown")
-    box = boxes[-1]
-    page.mouse.move(box["x"] + 60, box["y"] + 12)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 80, box["y"] + 20)
-    page.mouse.move(x, y, steps=4)
-    expect(page.locator(".ghost")).to_be_visible()
-    page.mouse.up()
-    expect(page.locator(".ghost")).to_have_count(0)
-
-
 def test_the_list_shows_live_values_and_where_they_are_used(desk: Page) -> None:
     line = item(desk, "robot", "/speed")
     expect(line.locator("small").first).to_contain_text("Float64")
@@ -105,7 +84,7 @@ def test_the_list_shows_live_values_and_where_they_are_used(desk: Page) -> None:
 
 def test_a_topic_dropped_on_the_page_is_shown_as_chosen(desk: Page, running: EditorServer) -> None:
     x, y = middle(box_of(desk, "#at-ready"))
-    drag(desk, item(desk, "robot", "/load"), x, y + 10)
+    drag_line(desk, item(desk, "robot", "/load"), x, y + 10)
     picks = desk.locator(".ways button")
     expect(picks.first).to_be_focused()
     titles = picks.locator("b").all_inner_texts()
@@ -122,7 +101,7 @@ def test_a_topic_dropped_on_the_page_is_shown_as_chosen(desk: Page, running: Edi
 
 
 def test_a_permission_dropped_on_a_button_locks_it(desk: Page, running: EditorServer) -> None:
-    drag(desk, item(desk, "robot", "/guard_locked"), *middle(box_of(desk, "#at-open")))
+    drag_line(desk, item(desk, "robot", "/guard_locked"), *middle(box_of(desk, "#at-open")))
     first = desk.locator(".ways button").first
     expect(first.locator("b")).to_have_text("Interlock")
     first.press("Enter")
