@@ -91,6 +91,13 @@ function load() {
   coming = made;
 }
 
+// The panel has the page no longer, or by another id.
+function loadFirst() {
+  page = "";
+  base = ROOT;
+  load();
+}
+
 /** @param {HTMLIFrameElement} made @param {number} number */
 async function loaded(made, number) {
   const shown = made.contentDocument;
@@ -104,6 +111,10 @@ async function loaded(made, number) {
   const now = state.drawn;
   const after = number < now ? await rendered(`?drawn=${now}`) : null;
   if (shown !== made.contentDocument || (made !== coming && made !== frame)) return;
+  if (!before && !after && page && made === coming) {
+    loadFirst();
+    return;
+  }
   if (before && after) redraw(shown, before, after);
   if (made === coming) {
     frame?.remove();
@@ -142,9 +153,7 @@ async function draw() {
   const after = await rendered(`?drawn=${wanted}`);
   if (wanted < drawn || shown !== frame?.contentDocument || before !== markup) return;
   if (!after) {
-    page = "";
-    base = ROOT;
-    load();
+    loadFirst();
     return;
   }
   redraw(shown, before, after);

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
@@ -141,6 +141,20 @@ def test_words_filter_the_list_and_escape_adds_nothing(desk: Page, running: Edit
     desk.keyboard.press("Escape")
     expect(line).to_be_focused()
     assert written(running) == before
+
+
+def test_the_robots_values_leave_the_pane_that_was_chosen_meanwhile(desk: Page) -> None:
+    item(desk, "robot", "/load")
+    held: list[Route] = []
+    desk.route("**/robot", lambda route: held.append(route))
+    wait(desk, lambda: held, "the values are asked for")
+    item(desk, "parts", "Gauge")
+    fragments: list[str] = []
+    desk.on("request", lambda request: fragments.append(request.url))
+    with desk.expect_request_finished(lambda request: request.url.endswith("/robot")):
+        held[0].fulfill(json={"values": {}, "rows": -1})
+    desk.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert not [url for url in fragments if "/parts/robot" in url]
 
 
 @pytest.mark.parametrize("tab", ["robot", "parts"])

@@ -1,12 +1,13 @@
 """The editor with a mouse and a keyboard: what is selected, moved, typed and saved."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, FilePayload, Page, expect
+from playwright.sync_api import Browser, FilePayload, Page, Route, expect
 
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
@@ -119,6 +120,27 @@ def test_an_edit_is_drawn_and_follows_with_its_sessions(desk: Page, editor: Edit
     until(lambda: editor.state()["live"] == drawn, "its sessions run")
     expect(preview(desk).locator("#at-speed")).to_contain_text("Belt speed")
     expect(preview(desk).locator("#state")).not_to_have_attribute("data-state", "lost")
+
+
+def test_a_page_that_is_being_loaded_may_get_another_id(desk: Page, editor: EditorServer) -> None:
+    reads: list[Route] = []
+    desk.route(
+        re.compile("/preview/pages/cell"),
+        lambda route: (
+            reads.append(route) if route.request.resource_type == "fetch" else route.continue_()
+        ),
+    )
+    desk.get_by_role("button", name="Deutsch", exact=True).click()
+    until(lambda: desk.evaluate("0") or reads, "the loaded page is read")
+    answer = editor.edit({"op": "rename", "path": ["page", 0], "id": "hall"}).raise_for_status()
+    drawn = answer.json()["drawn"]
+    until(lambda: desk.evaluate("0") or editor.state()["live"] == drawn, "its sessions run")
+    until(lambda: desk.evaluate("0") or len(reads) > 1, "the page is drawn again")
+    reads[0].continue_()
+    until(lambda: desk.evaluate("0") or len(reads) > 2, "the loaded page is read again")
+    reads[2].continue_()
+    expect(desk.locator("#pages [aria-current]")).to_have_attribute("data-page", "hall")
+    expect(preview(desk).locator("#at-speed")).to_be_visible()
 
 
 def test_undo_redo_and_save_by_keys(desk: Page, editor: EditorServer) -> None:
