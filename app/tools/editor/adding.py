@@ -13,6 +13,7 @@ from app.system.texts import TextLike, render, say
 from app.tools.editor.document import Change, edit_from, path_from
 from app.tools.editor.editor import Editor, PartRequest
 from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, ICONS, NAMES, added, place_near
+from app.tools.editor.paths import at as value_at
 from app.tools.editor.robot_list import SECTIONS, Row, Section
 from app.tools.editor.suggestions import Drop, Suggestion, drop_of, is_command
 
@@ -172,10 +173,5 @@ def _item(section: str, key: str) -> tuple[Section, str]:
 
 def _table(editor: Editor, path: Path) -> Mapping[str, Any]:
     """The table at a path; empty if there is none."""
-    value: Any = editor.document.tables
-    try:
-        for step in path:
-            value = value[step]
-    except (LookupError, TypeError):
-        return {}
+    value = value_at(editor.document.tables, path)
     return value if path and isinstance(value, Mapping) else {}

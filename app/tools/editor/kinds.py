@@ -7,7 +7,8 @@ from typing import Any, Final
 
 from app.panel.file.toml_lines import Path
 from app.system.texts import Text, say
-from app.tools.editor.suggestions import Drop, Suggestion, drop_of, taken_ids
+from app.tools.editor.references import OWNERS, taken_ids
+from app.tools.editor.suggestions import Drop, Suggestion, drop_of
 from app.tools.scaffold.parts import id_of
 
 
@@ -97,10 +98,9 @@ def added(kind: str, label: Any, tables: Mapping[str, Any], at: Path) -> Drop:
     if kind == "group":
         return Drop([{"op": "insert", "path": [*at], "value": {"title": label}}], at)
     listed = tables.get(kind, ())
-    taken = {str(table.get("id")) for table in listed if isinstance(table, Mapping)}
     named = {"page": {"title": label}, "alarm": {"text": label}, "source": {}}
     keys = named.get(kind, {"label": label})
-    value = {"id": id_of(kind, {*taken, *taken_ids(tables)}), **keys}
+    value = {"id": id_of(kind, taken_ids(tables)[OWNERS[(kind,)]]), **keys}
     place = (kind, len(listed))
     return Drop([{"op": "insert", "path": [*place], "value": value}], place)
 

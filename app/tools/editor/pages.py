@@ -266,13 +266,13 @@ def _robot_names(editor: Editor, table: Any) -> RobotNames:
     """What is on the robot, with the newest values of the topic that a table names."""
     robots = editor.robots
     robots.look()
-    rows = robots.rows(editor.preview.panel)
+    panel = editor.preview.panel
     topic = table.get("topic") if isinstance(table, Mapping) else None
-    values = robots.field_values(topic, editor.preview.panel) if isinstance(topic, str) else {}
+    values = robots.field_values(topic, panel) if isinstance(topic, str) else {}
     return RobotNames(
-        topics={row.name: row.type for row in rows["topics"]},
-        services={row.name: row.type for row in rows["services"]},
-        actions={row.name: row.type for row in rows["actions"]},
+        topics=robots.types("topics", panel),
+        services=robots.types("services", panel),
+        actions=robots.types("actions", panel),
         nodes=robots.nodes,
         values={(str(topic), field): value for field, value in values.items()},
     )

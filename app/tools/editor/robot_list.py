@@ -113,7 +113,6 @@ class RobotList:
         self._used: object = None
         self._names: object = None
         self.robot: RobotGraph | None = None
-        self._below = ""
         self._latest: dict[str, Latest] = {}
         self._parameters: dict[str, NodeParameter] = {}
 
@@ -144,8 +143,9 @@ class RobotList:
                     await self._wake.wait()
 
     async def _read(self, place: Place) -> None:
-        """Reads the graph and the topics of one place until nobody looks, or it is another place."""
+        """Reads a place: its graph and topics, until no browser shows the list or the place changes."""
         interfaces = load_interfaces(place.distro, place.interfaces)
+        self._latest.clear()  # of an earlier link: values of then are not those of now
         async with opened(place) as (observer, graph):
             services: asyncio.Task[None] | None = None
             topics: asyncio.Task[None] | None = None
@@ -154,7 +154,6 @@ class RobotList:
             try:
                 while self._is_watched and await self._place() == place:
                     self.robot, self.fault = fullest(graph), ""
-                    self._below = place.namespace.removeprefix(self.robot.namespace)
                     now = asyncio.get_running_loop().time()
                     if (services is None or services.done()) and now - read_at > PARAMETERS_EVERY_S:
                         read_at = now
@@ -256,6 +255,11 @@ class RobotList:
         return {
             topic.name: self.value(topic, interfaces) for topic in topics if topic.name in self._latest
         }
+
+    def types(self, section: Section, panel: Panel | None) -> Mapping[str, str]:
+        """Name → type of the items of a section."""
+        items = self._items(panel).items()
+        return {item.name: item.type for (name, _), item in items if name == section}
 
     @property
     def nodes(self) -> Sequence[str]:

@@ -290,12 +290,12 @@ class EditSession:
         self._choices[name] = choice
         self.conflicts = tuple(each for each in self.conflicts if each.name != name)
 
-    def save(self, *, anew: bool = False, author: str = "") -> Saved:
+    def save(self, *, recreate: bool = False, author: str = "") -> Saved:
         """Writes the file whole, or not at all: SessionError, or SaveConflict if it has changed on the
-        disk in the same tables. `anew`: also if the file was removed."""
+        disk in the same tables. `recreate`: also if the file was removed."""
         merged = False
         for _ in range(TRIES):
-            on_disk = self._on_disk(anew)
+            on_disk = self._on_disk(recreate)
             if on_disk is not None and on_disk != self._base:
                 merged = self.merge_from_disk(author) or merged
             try:
@@ -307,12 +307,12 @@ class EditSession:
             return Saved(backup, merged, problem)
         raise SessionError(say("edit_file_changes", file=str(self.path)))
 
-    def _on_disk(self, anew: bool) -> bytes | None:
-        """The bytes of the file; None if it was removed, and may be written anew."""
+    def _on_disk(self, recreate: bool) -> bytes | None:
+        """The bytes of the file; None if it was removed, and may be written again."""
         try:
             return self.path.read_bytes()
         except FileNotFoundError as error:
-            if anew:
+            if recreate:
                 return None
             raise SessionError(say("edit_file_gone", file=str(self.path))) from error
         except OSError as error:

@@ -5,11 +5,12 @@ They are those of `operator-panel scaffold`, and beside each display what else c
 alarm of it, and the interlock that it may be.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, log10
 from typing import Any, Final, Literal
 
+from app.panel.condition import COMPARISONS
 from app.panel.file.toml_lines import Path
 from app.panel.widgets.families import Command
 from app.panel.widgets.kinds import KINDS
@@ -18,6 +19,7 @@ from app.ros.graph.node_services import NodeParameter
 from app.ros.messages import Interfaces
 from app.system.errors import InterfaceError
 from app.system.texts import TextLike, say
+from app.tools.editor.references import OWNERS, taken_ids
 from app.tools.scaffold import widgets
 from app.tools.scaffold.parts import NEGATIVE, DraftWidget, Omission, id_of, label_of, permits
 from app.tools.scaffold.widgets import BOOL
@@ -191,7 +193,7 @@ def drop_of(
     alarm and an interlock behind the others. A command is locked by the panel's only interlock. An
     interlock that is dropped `on` a command locks it; one that the file has is not written again."""
     if suggestion.where == "widget":
-        own_id = id_of(suggestion.name, taken_ids(tables))
+        own_id = id_of(suggestion.name, taken_ids(tables)["widget"])
         table = {"id": own_id, "kind": suggestion.kind, **suggestion.table}
         interlocks = tables.get("interlock", ())
         if columns := _columns_at(tables, at):
@@ -205,7 +207,7 @@ def drop_of(
     number = _same_interlock(suggestion, listed)
     if number is None:
         number = len(listed)
-        own_id = id_of(suggestion.name, {str(table.get("id")) for table in listed})
+        own_id = id_of(suggestion.name, taken_ids(tables)[OWNERS[(suggestion.where,)]])
         value = {"id": own_id, **suggestion.table}
         edits.append({"op": "insert", "path": [suggestion.where, number], "value": value})
     else:
@@ -227,11 +229,14 @@ def _columns_at(tables: Any, at: Path) -> int:
 
 
 def _same_interlock(suggestion: Suggestion, listed: Sequence[Mapping[str, Any]]) -> int | None:
-    """The number of the interlock that waits for the same topic."""
+    """The number of the interlock that waits for the same topic to be true."""
     if suggestion.where != "interlock":
         return None
-    topics = [table.get("topic") for table in listed]
-    return topics.index(suggestion.table["topic"]) if suggestion.table["topic"] in topics else None
+    for number, table in enumerate(listed):
+        compares = any(key in table for key in COMPARISONS)
+        if table.get("topic") == suggestion.table["topic"] and not compares:
+            return number
+    return None
 
 
 def _lock(tables: Any, on: Path, interlock: str) -> Mapping[str, Any] | None:
@@ -253,24 +258,3 @@ def is_command(widget: Mapping[str, Any]) -> bool:
     """Whether the table of a widget is a command's."""
     kind = KINDS.get(str(widget.get("kind")))
     return kind is not None and issubclass(kind.model, Command)
-
-
-def taken_ids(tables: Mapping[str, Any]) -> Collection[str]:
-    """The ids that no new widget can have: those of widgets, and of sets of recipes."""
-    taken: set[str] = {
-        str(table.get("id")) for table in tables.get("recipe", ()) if isinstance(table, Mapping)
-    }
-
-    def walk(value: Any) -> None:
-        if isinstance(value, Mapping):
-            for key, inner in value.items():
-                if key == "widget" and isinstance(inner, list):
-                    taken.update(str(w.get("id")) for w in inner if isinstance(w, Mapping))
-                elif key in ("page", "group", "frame"):
-                    walk(inner)
-        elif isinstance(value, list):
-            for inner in value:
-                walk(inner)
-
-    walk(tables)
-    return taken

@@ -37,7 +37,7 @@ async function refresh() {
   const response = await get("/robot");
   if (!response) return;
   const { values, rows: version } = await response.json();
-  if (left.dataset.part !== "robot") return; // another pane was chosen meanwhile
+  if (left.dataset.part !== "robot") return; // another pane was chosen in the meantime
   if (version !== rows) {
     rows = version;
     await fill(left, "robot");

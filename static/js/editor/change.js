@@ -240,7 +240,7 @@ function closest(list, x, y) {
     const box = boxOf(place);
     return box ? [{ place, box, far: distance(box, x, y) }] : [];
   });
-  return boxes.sort((one, other) => one.far - other.far)[0];
+  return boxes.sort((nearer, other) => nearer.far - other.far)[0];
 }
 
 /** @param {Box} box @param {number} x @param {number} y */

@@ -24,9 +24,9 @@ export function select(path, from) {
   for (const listener of listeners) listener(path, from);
 }
 
-/** @param {Path | null} one @param {Path | null} other */
-export function isSame(one, other) {
-  return JSON.stringify(one) === JSON.stringify(other);
+/** @param {Path | null} path @param {Path | null} other */
+export function isSame(path, other) {
+  return JSON.stringify(path) === JSON.stringify(other);
 }
 
 // Whether the table `outer` is around the other, or the same.

@@ -199,7 +199,7 @@ def test_a_file_that_is_gone_is_written_only_if_asked(file: Path, opened: Open) 
         session.save()
     assert code(refused) == "edit_file_gone"
     assert not file.exists()
-    session.save(anew=True)
+    session.save(recreate=True)
     assert file.read_text() == changed(GO)
 
 

@@ -190,3 +190,12 @@ def test_a_widget_takes_a_part_of_its_group(kind: str, columns: int | None, span
     at = ("page", 0, "group", 0, "widget", 0)
     (edit,) = drop_of(Suggestion("widget", kind, {"label": "A"}, "a"), tables, at).edits
     assert edit["value"].get("span") == span
+
+
+def test_an_interlock_has_no_id_of_a_condition_and_is_not_one_that_waits_for_false() -> None:
+    tables = tomllib.loads(FILE.replace("require_publisher", "equals = false\nrequire_publisher"))
+    tables["condition"] = [{"id": "ready_2"}]
+    choice = suggestions_for(topic("/ready", BOOL), INTERFACES).choices[0]
+    drop = drop_of(choice, tables, ("page", 0, "widget", 0))
+    assert drop.edits[0]["value"]["id"] == "ready_3"
+    assert drop.select == ("interlock", 1)

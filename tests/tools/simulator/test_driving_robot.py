@@ -155,8 +155,8 @@ def test_collision_monitor_slows_the_robot_before_a_box_and_stops_it(robot: Step
     assert robot.call("/obstacle", data=True).success
     robot.robot.actions[NAVIGATE].begin(GOAL_ID, goal(PLACES["WRAPPER"]))
     robot.run(12)
-    told = dict.fromkeys(robot.values("/collision_monitor_state", "action_type"))
-    assert [*told] == [0, 2, 1]
+    reported = dict.fromkeys(robot.values("/collision_monitor_state", "action_type"))
+    assert [*reported] == [0, 2, 1]
     assert newest(robot, "/collision_monitor_state").polygon_name == "PolygonStop"
     near = max(robot.values("/odom", "twist.twist.linear.x")[-60:])
     assert near <= 0.5 + 1e-6
