@@ -59,6 +59,7 @@ PROMISES: Final[Mapping[str, str]] = {
     "log": "the log says who pressed what, and the result; it can be verified",
     "hold": "a hold ends with its finger, its page or its connection",
     "stop": "Stop works on every page, with other fingers on the screen, and says when it can't",
+    "stops": "the first cause of a stop is the right one, or it is said that it can't be told",
     "alarms": "alarms follow the table of states; none is lost over a restart",
     "recipes": "a recipe is loaded whole or not at all",
     "users": "no one acts without the role; the delays of the sign-in lock out no one else",

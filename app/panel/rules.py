@@ -3,7 +3,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Self
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field
@@ -16,6 +16,7 @@ from app.panel.widgets.displays import (
     LampState,
     PictureName,
     StatesKey,
+    StateValue,
     resolve_state_value,
     state_faults,
 )
@@ -172,6 +173,7 @@ class ScreenRules(Description):
 
 STATE_ID: Final = "machine_state"
 MAX_DETAILS: Final = 2
+OF_STOPS: Final = frozenset({"stops", "effects"})  # keys that the display has otherwise, or not
 
 
 class StateDetail(TopicField):
@@ -184,8 +186,12 @@ class StateDetail(TopicField):
 
 class StateRules(StatesKey, TopicField):
     """The states that the robot reports, with the word and the shape of each; a state that it does not
-    report now is shown as not known."""
+    report now is shown as not known. `stops` are the values with which the machine has stopped for a
+    reason that someone will ask for; `effects` are ids of interlocks, conditions and alarms that only
+    follow from a stop."""
 
+    stops: Annotated[tuple[StateValue, ...], Field(strict=False)] | None = None
+    effects: Annotated[tuple[Id, ...], Field(strict=False)] = ()
     details: Annotated[tuple[StateDetail, ...], Field(strict=False, max_length=MAX_DETAILS)] = Field(
         (), alias="detail"
     )
@@ -193,9 +199,24 @@ class StateRules(StatesKey, TopicField):
     @cached_property
     def display(self) -> "MachineState":
         """The display in the frame of every page."""
-        keys: dict[str, Any] = {name: getattr(self, name) for name in type(self).model_fields}
+        names = type(self).model_fields.keys() - OF_STOPS
+        keys: dict[str, Any] = {name: getattr(self, name) for name in names}
         fixed: dict[str, Any] = {"id": STATE_ID, "kind": "state", "label": say("machine_state")}
+        fixed["stops"] = self.stop_values
         return MachineState.model_construct(None, **fixed, **keys)
+
+    @cached_property
+    def stop_values(self) -> tuple[Any, ...]:
+        """The values of `stops`; by default of the states that are red."""
+        red = (state.value for state in self.states if state.colour == "red")
+        return tuple(red) if self.stops is None else self.stops
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        resolved = super().with_constants(interfaces)
+        if self.stops is None:
+            return resolved
+        stops = tuple(self.value_of(value, interfaces) for value in self.stops)
+        return resolved.model_copy(update={"stops": stops})
 
     def value_of(self, value: bool | int | str, interfaces: Interfaces) -> Any:
         """The value of a state in the message: that of a constant by its name."""
@@ -209,6 +230,7 @@ class MachineState(Display):
     kind: Literal["state"]
     states: tuple[LampState, ...]
     details: tuple[StateDetail, ...] = ()
+    stops: tuple[Any, ...] = ()
 
     def sources(self) -> Iterator[TopicSource]:
         yield from super().sources()

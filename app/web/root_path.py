@@ -16,7 +16,17 @@ from app.system.settings import Settings, parse_root_path
 OWN_PATHS: Final = frozenset(
     {
         *("pages", "events", "widgets", "presses", "control", "robots", "log", "log.csv", "display"),
-        *("alarms", "diagnostics", "recordings", "help", "recipes", "session", "signin", "users"),
+        *(
+            "alarms",
+            "stops",
+            "diagnostics",
+            "recordings",
+            "help",
+            "recipes",
+            "session",
+            "signin",
+            "users",
+        ),
         *("places", "static", "healthz", "readyz", "metrics", "gallery", "openapi.json"),
     }
 )

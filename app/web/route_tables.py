@@ -30,6 +30,7 @@ LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "presses": ("presses",),
     "control": ("control",),
     "alarms": ("alarms", "alarm_history", "alarm_report"),
+    "stops": ("stops",),
     "recipes": ("recipes",),
     "places": ("saved_places",),
     "diagnostics": ("diagnostics",),

@@ -1,6 +1,6 @@
 """The protocol of the peer that a robot is reached by, and the signals of a robot."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, ParamSpec, Protocol
 
@@ -43,6 +43,8 @@ class RobotSignals:
         self.arrived = Signal[[bool]]()
         # A permission is about to be checked: it needs everything that has arrived.
         self.judging = Signal[[]]()
+        # A step of a turn was ingested: messages on topics with these keys, or anything else (True).
+        self.stepped = Signal[[Collection[str], bool]]()
         # A turn has run: a permission may have changed.
         self.ran = Signal[[]]()
         # Something that permission or the view depends on has changed, but no data has arrived.

@@ -121,6 +121,8 @@ async def open_fleet(
             await fleet.start()
             if states is not None:
                 states.start()
+            if fleet.journal is not None:
+                fleet.journal.start(fleet.states)
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
@@ -129,6 +131,8 @@ async def open_fleet(
             if states is not None:
                 await states.stop()
             await fleet.stop()
+            if fleet.journal is not None:
+                await fleet.journal.stop()
             await fleet.alarms.stop()
             await fleet.recipes.stop()
             if fleet.place_file is not None:

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
     from app.cell.session.maps import MapPictures
     from app.cell.session.place_file import SavedPlaceFile
+    from app.cell.stops.changes import ChangeJournal
 
 log = logging.getLogger("kiosk.fleet")
 
@@ -122,6 +123,15 @@ def _place_file(panel: Panel) -> "SavedPlaceFile | None":
     return SavedPlaceFile()
 
 
+def _journal(panel: Panel) -> "ChangeJournal | None":
+    """The journal of changes, for a panel that can say that the machine has stopped."""
+    if panel.state is None and not panel.alarms:
+        return None
+    from app.cell.stops.changes import ChangeJournal
+
+    return ChangeJournal()
+
+
 def _has_received(robot: RobotState, other: RobotState | None) -> bool:
     own, wanted = robot.received(), other.received() if other else {}
     aged = {robot.key(c.topic) for c in robot.conditions.values() if c.max_age_s is not None}
@@ -176,6 +186,7 @@ class Fleet:
         self.alarms = Alarms(panel)
         self.recipes = Recipes(panel)
         self.place_file = _place_file(panel)
+        self.journal = _journal(panel)
         self.group_stops = GroupStops()
         self.confirm_locks = ConfirmLocks()  # locked until the users are known
         self.states: Path | None = None  # the file of the machine's states
@@ -192,6 +203,7 @@ class Fleet:
             self.recipes,
             self.confirm_locks,
             self.place_file,
+            self.journal,
             link,
         )
         for entry in panel.robots or (None,):

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from app.cell.history.trends import TrendRecorder
     from app.cell.session.maps import MapListener
     from app.cell.session.place_file import SavedPlaceFile
+    from app.cell.stops.changes import ChangeJournal, ChangeObserver
 
 
 # Replaces a lost Zenoh session, with retries.
@@ -308,6 +309,7 @@ class ServerParts:
     recipes: Recipes | None = None
     confirm_locks: ConfirmLocks = UNKNOWN_USERS
     place_file: "SavedPlaceFile | None" = None
+    journal: "ChangeJournal | None" = None
     link: Callable[[Config, Callable[[bool], None], Dialect], ZenohSession] = ZenohSession
 
 
@@ -396,6 +398,7 @@ def wire_session(
             published_alarms,
             *recorders,
             *map_listeners,
+            *_observers(server, context),
         ],
     )
     own_line = partial(_show_own_line, robot, refresher)
@@ -442,6 +445,18 @@ def wire_session(
     )
     _connect(signals, robot_alarms, session)
     return session
+
+
+def _observers(server: ServerParts, context: RobotContext) -> "list[ChangeObserver]":
+    """What records the changes from which a stop is explained; nothing on a panel without a journal."""
+    if server.journal is None:
+        return []
+    from app.cell.stops.changes import ChangeObserver
+
+    observer = ChangeObserver(context.panel, context.robot, server.journal)
+    context.signals.stepped.connect(observer.step)
+    context.signals.ran.connect(observer.finish)
+    return [observer]
 
 
 def _place_acts(

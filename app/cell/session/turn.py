@@ -247,6 +247,7 @@ class Turn:
         self._link = context.link
         self._robot = context.robot
         self._link_lost, self._ran = context.signals.link_lost, context.signals.ran
+        self._stepped = context.signals.stepped
         self._peer = peer
         self._control = control
         self._ingest = ingest
@@ -377,6 +378,7 @@ class Turn:
             self.on_graph_change(updates.peer_appeared)
         self._alarms.update(updates.topics)
         self._commands.holds.judge()
+        self._stepped.emit(updates.topics, updates.graph or not updates.topics)
         for key, reading in updates.readings:
             self._confirm(key, reading)
         if updates.urgent or self._again:

@@ -271,7 +271,8 @@ MINUTE_S: Final = 60.0
 
 def machine_state(display: MachineState, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of the machine's state: those of a lamp, `since` (how long it has been so, "" where
-    that was not heard) and `detail0`, `detail1`; and when time alone changes them.
+    that was not heard), `why` (what asks for the story of a stop, "" while it has not stopped) and
+    `detail0`, `detail1`; and when time alone changes them.
 
     A state that is not known now has a shape and a word of its own, and never a colour. An active alarm
     with a `state` replaces what the robot says.
@@ -281,7 +282,8 @@ def machine_state(display: MachineState, robot: RobotState, now: float) -> tuple
         text, shape, colour = lamp_of(display.states, alarmed.value)
         since, until = _for_s(now - alarmed.since, now)
         shown = {"state": "live", "text": text, "shape": shape, "colour": colour, "note": ""}
-        return {**shown, "since": since, **details}, min(until, changes)
+        why = _why(display, alarmed.value)
+        return {**shown, "since": since, "why": why, **details}, min(until, changes)
     field = field_state(display, robot, now)
     text, shape, colour = lamp_of(display.states, field.value, robot.texts)
     since, until = _since(display, robot, now)
@@ -289,7 +291,13 @@ def machine_state(display: MachineState, robot: RobotState, now: float) -> tuple
         text, shape, colour = say(LAMP_WORDS[field.state]), SHAPES[field.state], "none"
         since, until = "", math.inf
     shown = {"state": field.state, "text": text, "shape": shape, "colour": colour, "note": field.note}
-    return {**shown, "since": since, **details}, min(field.until, until, changes)
+    why = _why(display, field.value if field.state == "live" else None)
+    return {**shown, "since": since, "why": why, **details}, min(field.until, until, changes)
+
+
+def _why(display: MachineState, value: Any) -> TextLike:
+    """What asks for the story of a stop; "" for a state that is none."""
+    return say("story_title") if any(same_value(value, stop) for stop in display.stops) else ""
 
 
 def _since(display: MachineState, robot: RobotState, now: float) -> tuple[TextLike, float]:

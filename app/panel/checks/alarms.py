@@ -20,6 +20,7 @@ from app.panel.fault_catalogue import CatalogueError, read_catalogue
 from app.panel.file.wording import closest_name, known_hint, list_names, no_such
 from app.panel.model import Panel
 from app.panel.robot_panels import widget_robots
+from app.panel.rules import StateRules
 from app.panel.shared_keys import number_key_faults
 from app.panel.template import input_ids
 from app.panel.values import number_text, same_value
@@ -114,14 +115,32 @@ def _state_faults(place: str, alarm: Alarm, panel: Panel) -> Iterator[Fault]:
     """The state that it shows is one of `[state]`."""
     if alarm.state is None:
         return
-    place, cause = f"{place}.state", f"state {alarm.state}"
-    known = [state.value for state in panel.state.states] if panel.state else []
-    if not known:
-        yield Fault(place, "is a state of the header: the panel has no [state]", cause=cause)
-    elif not any(same_value(value, alarm.state) for value in known):
-        hint = known_hint(str(alarm.state), map(str, known))
-        message = f"no state {format_value(alarm.state)}; {hint}"
-        yield Fault(place, message, cause=cause)
+    if panel.state is None:
+        message, cause = "is a state of the header: the panel has no [state]", f"state {alarm.state}"
+        yield Fault(f"{place}.state", message, cause=cause)
+    else:
+        yield from _unknown_state(f"{place}.state", alarm.state, panel.state)
+
+
+def _unknown_state(place: str, value: bool | int | str, rules: StateRules) -> Iterator[Fault]:
+    """A value that is none of the states of `[state]`."""
+    known = [state.value for state in rules.states]
+    if not any(same_value(value, state) for state in known):
+        hint = known_hint(str(value), map(str, known))
+        yield Fault(place, f"no state {format_value(value)}; {hint}", cause=f"state {value}")
+
+
+def stop_faults(panel: Panel) -> Iterator[Fault]:
+    """Faults of the keys of `[state]` that say what a stop is, and what follows from one."""
+    if panel.state is None:
+        return
+    for n, value in enumerate(panel.state.stops or ()):
+        yield from _unknown_state(f"state.stops[{n}]", value, panel.state)
+    known = [*(each.id for each in panel.named_conditions), *(each.id for each in panel.alarms)]
+    for n, name in enumerate(panel.state.effects):
+        if name not in known:
+            message = f'no interlock, condition or alarm "{name}"; {known_hint(name, known)}'
+            yield Fault(f"state.effects[{n}]", message, cause=f"effect {name}")
 
 
 def _command_faults(place: str, alarm: Alarm, panel: Panel, faulty: Collection[str]) -> Iterator[Fault]:

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from app.panel.checks.alarms import alarm_faults
+from app.panel.checks.alarms import alarm_faults, stop_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
 from app.panel.checks.look import (
     brand_faults,
@@ -238,6 +238,7 @@ def find_faults(
         *condition_faults_of(panel, interfaces),
         *of_widgets,
         *alarm_faults(panel, interfaces, with_faults),
+        *stop_faults(panel),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
     missed |= (

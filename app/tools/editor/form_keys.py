@@ -387,6 +387,8 @@ REFERENCES: Final[Mapping[str, Names]] = {
     "alarm.ack_input": _widgets_of(Input),
     "alarm.inhibits": _widgets_of(Command),
     "alarm.state": _words_of_the_state,
+    "state.stops": _words_of_the_state,
+    "state.effects": _listed("interlock", "condition", "alarm"),
     "alarm_list.group": _alarm_groups,
     "alarm_line.group": _alarm_groups,
     "same": _widgets_of(object),

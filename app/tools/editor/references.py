@@ -57,6 +57,7 @@ REFERENCES: Final[Mapping[str, tuple[Form, tuple[Group, ...]]]] = {
     "sequence.alarms": ("id", ("alarm",)),
     "steps.condition": ("id", ("condition",)),
     "recovery.condition": ("id", ("condition",)),
+    "state.effects": ("id", ("condition", "alarm")),
     "alarm.inhibits": ("control", ("widget", "robot")),
     "alarm.ack_command": ("id", ("widget",)),
     "alarm.ack_input": ("id", ("widget",)),

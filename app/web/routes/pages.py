@@ -51,6 +51,8 @@ OTHER_PAGES = (
     "alarm-confirm.html",
     "alarm-history.html",
     "alarm-report.html",
+    "stops.html",
+    "stop.html",
     "diagnostics.html",
     "_diagnostics.html",
     "_look.html",

@@ -1,0 +1,158 @@
+"""Reads stops and their stories from the stores of a running server, when they are asked for."""
+
+import asyncio
+from collections.abc import Sequence
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Final
+
+from app.cell.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow, history_rows, reading
+from app.cell.session.fleet import Fleet
+from app.cell.session.session import RobotSession
+from app.cell.stops.changes import Change, ChangeFilter, read_changes
+from app.cell.stops.sources import (
+    STOPPING_PRIORITY,
+    PanelNames,
+    alarm_events,
+    alarm_stops,
+    change_events,
+    change_stops,
+    goal_stops,
+    log_events,
+    separate,
+)
+from app.cell.stops.story import AFTER_S, BEFORE_S, MOST_EVENTS, Event, Stop, StopSort, Story, story_of
+from app.records import Filter, LogRow, NullLog, OperatorLog
+from app.system.errors import NotFound
+from app.system.texts import say
+
+MOST_STOPS: Final = 200
+LATE_S: Final = 5.0  # by so much the arrival of a stamped change may be later than its stamp
+FORWARD_S: Final = 86_400.0  # in which the end of a stop is looked for
+
+
+class StopReader:
+    """The stops of all robots of a fleet. Used on the event loop only; it reads beside it."""
+
+    def __init__(self, fleet: Fleet, log: OperatorLog | NullLog) -> None:
+        self._fleet = fleet
+        self._log = log
+
+    @cached_property
+    def _names(self) -> dict[str, PanelNames]:
+        sessions = self._fleet.sessions
+        return {self._id(session): PanelNames(session.panel) for session in sessions}
+
+    def _id(self, session: RobotSession) -> str:
+        return session.entry.id if session.entry else ""
+
+    def names(self, robot: str) -> PanelNames:
+        """What the panel of a robot calls its parts; of the first for one that is no longer there."""
+        return self._names.get(robot) or next(iter(self._names.values()))
+
+    async def stops(self, since: float, until: float, robot: str | None = None) -> list[Stop]:
+        """The newest stops from `since` on and before `until` (seconds since the epoch), the newest
+        first, at most `MOST_STOPS`. LogError if they can't be read, TooMany if too many searches
+        run."""
+        wanted = ChangeFilter(robot, since, until, only_stops=True)
+        known: list[Stop] = [*change_stops(self.names, await self._changes(wanted, MOST_STOPS))]
+        for priority in range(1, STOPPING_PRIORITY + 1):
+            asked = HistoryFilter(since=since, until=until, priority=priority, robot=robot or "")
+            known += alarm_stops(await self._alarms(asked, MAX_PAGE))
+        aborted = Filter(since=round(since * 1000), until=round(until * 1000), outcome="aborted")
+        rows = await self._entries(aborted, MOST_STOPS)
+        for session in self._fleet.sessions:
+            if robot in (None, self._id(session)):
+                own = [row for row in rows if row.entry.robot == session.robot.name]
+                known += goal_stops(self.names(self._id(session)), self._id(session), own)
+        return separate(known)[:MOST_STOPS]
+
+    async def latest(self, now: float, robot: str | None = None) -> Stop | None:
+        """The newest stop of the last day; None without one. Errors as of `stops`."""
+        return next(iter(await self.stops(now - FORWARD_S, now + 1.0, robot)), None)
+
+    async def of_alarm(self, alarm: str, occurrence: int) -> Stop | None:
+        """The raise of an alarm; None if there is no record of it."""
+        rows = await self._alarms(HistoryFilter(alarm=alarm), MAX_PAGE)
+        raised = [row for row in rows if row.occurrence == occurrence and row.event == "raised"]
+        return next((self._as_stop(row) for row in raised), None)
+
+    def _as_stop(self, row: HistoryRow) -> Stop:
+        """An alarm of any priority as a stop: someone asks for its story."""
+        (stop,) = alarm_stops([row._replace(priority=1)])
+        return stop
+
+    async def story(self, sort: StopSort, number: int) -> Story:
+        """The story of the stop with this number. NotFound if there is no record of it."""
+        stop = await self._stop(sort, number)
+        if stop is None:
+            raise NotFound(say("story_gone"))
+        since, until = stop.begun - BEFORE_S, max(stop.at, stop.begun) + AFTER_S + LATE_S
+        names = self.names(stop.robot)
+        wanted = ChangeFilter(stop.robot, since, until)
+        changes = await self._changes(wanted, MOST_EVENTS)
+        alarms = await self._alarms(HistoryFilter(since=since, until=until), MOST_EVENTS)
+        entries = await self._entries(
+            Filter(since=round(since * 1000), until=round(until * 1000)), MOST_EVENTS
+        )
+        robot = self._fleet.of_robot(stop.robot).robot.name
+        events: list[Event] = [
+            *change_events(names, changes),
+            *alarm_events(names, [row for row in reversed(alarms) if row.robot in ("", stop.robot)]),
+            *log_events(names, [row for row in reversed(entries) if row.entry.robot in ("", robot)]),
+        ]
+        rules = self._fleet.panel.state
+        left_out = sum(len(rows) >= MOST_EVENTS for rows in (changes, alarms, entries))
+        return story_of(stop, events, frozenset(rules.effects) if rules else (), left_out)
+
+    async def end_of(self, stop: Stop) -> float | None:
+        """When a state that is a stop was over, in seconds since the epoch; None while it is not, and
+        for stops that are no states."""
+        if stop.sort != "state":
+            return None
+        later = ChangeFilter(stop.robot, stop.at, stop.at + FORWARD_S)
+        rows = await self._changes(later, MOST_EVENTS)
+        return next((row.at for row in rows if row.sort == "state" and row.seq > stop.number), None)
+
+    async def _stop(self, sort: StopSort, number: int) -> Stop | None:
+        if sort in ("state", "link"):
+            rows = await self._changes(ChangeFilter(seq=number), 1)
+            stops = change_stops(self.names, (row for row in rows if row.sort == sort))
+            return next(stops, None)
+        if sort == "alarm":
+            asked = await self._alarms(HistoryFilter(before=number + 1), 1)
+            return next((self._as_stop(row) for row in asked if row.seq == number), None)
+        for row in await self._entries(Filter(outcome="aborted"), 1, before=number + 1):
+            for session in self._fleet.sessions:
+                if row.entry.seq == number and row.entry.robot == session.robot.name:
+                    robot = self._id(session)
+                    return next(goal_stops(self.names(robot), robot, [row]), None)
+        return None
+
+    async def _changes(self, wanted: ChangeFilter, most: int) -> list[Change]:
+        if self._fleet.states is None:
+            return []
+        return await asyncio.to_thread(read_changes, self._fleet.states, wanted, most)
+
+    async def _alarms(self, wanted: HistoryFilter, most: int) -> list[HistoryRow]:
+        """The newest first."""
+        return await self._fleet.alarms.history.read(partial(_read_alarms, wanted=wanted, most=most))
+
+    async def _entries(self, wanted: Filter, most: int, before: int | None = None) -> Sequence[LogRow]:
+        """The newest first; none without a log."""
+        if not isinstance(self._log, OperatorLog):
+            return []
+        return await self._log.rows(wanted, before, most)
+
+
+def _read_alarms(path: Path | None, wanted: HistoryFilter, most: int) -> list[HistoryRow]:
+    """The newest `most` transitions of a filter, page by page."""
+    rows: list[HistoryRow] = []
+    with reading(path) as db:
+        while len(rows) < most:
+            before = rows[-1].seq if rows else wanted.before
+            page = history_rows(db, wanted._replace(before=min(before, NEWEST)), MAX_PAGE)
+            rows += page
+            if len(page) < MAX_PAGE:
+                break
+    return rows[:most]

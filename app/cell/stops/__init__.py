@@ -1,0 +1,1 @@
+"""Why the machine stopped: what changed around a stop, and what was first."""

@@ -1,0 +1,341 @@
+"""Why the machine stopped: the list of stops, and the story of each as a page and as JSON."""
+
+import time
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from itertools import groupby
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypedDict
+
+from fastapi import APIRouter, Path, Query, Request
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.cell.session.stops import StopReader
+from app.cell.stops.sources import PanelNames, panel_alarm
+from app.cell.stops.story import Event, Line, Stop, StopSort, Story
+from app.cell.view.times import duration_text
+from app.system.clock import format_datetime, format_time, iso_time
+from app.system.errors import NotFound
+from app.system.texts import Text, TextLike, joined, localized, number, render, say
+from app.system.texts.locales import MINUS
+from app.web.app_state import AppState, CurrentState
+from app.web.caller import caller_of
+from app.web.pages.alarms import word as alarm_word
+from app.web.pages.context import FramedPage, framed_page
+from app.web.pages.log_words import day_name, who_of
+from app.web.pages.log_words import word as log_word
+from app.web.requests import errors
+
+router = APIRouter()
+
+DAYS_S: Final = 7 * 86_400.0  # that the list goes back
+KEY: Final = r"^(state|alarm|goal|link)-[1-9][0-9]{0,17}$"
+# The icon of each sort of event.
+SIGNS: Final = {
+    "state": "arrow-right", "interlock": "lock", "condition": "circle-dot", "alarm": "",
+    "link": "unlink", "node": "unlink", "publisher": "unlink", "clock": "clock",
+    "press": "circle-dot", "refused": "lock", "goal": "flag", "control": "user",
+    "recipe": "clipboard-list", "server": "power",
+}  # fmt: skip
+Key = Annotated[str, Path(pattern=KEY, max_length=24)]
+
+
+class StopsQuery(BaseModel):
+    """`robot` is the id of the one whose stops are listed; "" lists those of all."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    robot: Annotated[str, Field(max_length=64)] = ""
+
+
+class StoryQuery(BaseModel):
+    """`all`: every line, not only those that tell most."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    all: Literal["", "1"] = ""
+
+
+class AlarmQuery(BaseModel):
+    """A raise of an alarm."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    id: Annotated[str, Field(max_length=300)]
+    occurrence: Annotated[int, Field(ge=0, lt=2**53)]
+
+
+class ShownStop(NamedTuple):
+    """A row of the list."""
+
+    key: str
+    sort: str
+    time: Text
+    iso: str
+    robot: str
+    text: TextLike
+
+
+class ShownLine(NamedTuple):
+    """A line of a story; `offset` is counted from the first cause, or else from the stop."""
+
+    offset: TextLike
+    sort: str
+    sign: str
+    priority: int
+    text: TextLike
+    detail: TextLike
+    change: TextLike
+    is_first: bool
+    is_before: bool
+
+
+class ToDo(NamedTuple):
+    """What to do about a stop: steps, and the picture of the panel's folder, "" without one."""
+
+    steps: Sequence[str]
+    picture: TextLike
+
+
+class StoryContext(TypedDict):
+    """The variables of `stop.html`, beside those of the frame."""
+
+    story: Story
+    at: Text
+    lasted: TextLike
+    lines: list[ShownLine]
+    is_whole: bool
+    these: TextLike
+    every: TextLike
+    order: TextLike
+    left_out: TextLike
+    to_do: ToDo
+    alarm_word: Any
+    log_word: Any
+    word: Any
+
+
+def word(name: str, **about: Any) -> Text:
+    return say(f"story_{name}", **about)
+
+
+@router.get(
+    "/stops",
+    response_class=HTMLResponse,
+    summary="The stops of the last week, the newest first",
+    responses=errors(403, 422, 429, 503),
+)
+async def stops(
+    request: Request, state: CurrentState, query: Annotated[StopsQuery, Query()]
+) -> Response:
+    now = time.time()
+    newest = await _reader(state).stops(now - DAYS_S, now + 1.0, query.robot or None)
+    page = FramedPage("stops.html", word("list"), "/stops", "alarms")
+    robots = {str(robot.id): robot.name for robot in state.fleet.panel.robots}
+    context = {
+        "days": list(_by_day(newest)), "robots": robots, "word": word, "alarm_word": alarm_word,
+        "log_word": log_word,
+    }  # fmt: skip
+    return framed_page(request, state, page, context)
+
+
+@router.get(
+    "/stops/latest",
+    summary="To the story of the newest stop of the last day, or else to the list",
+    responses=errors(403, 422, 429, 503),
+    status_code=303,
+    response_class=RedirectResponse,
+)
+async def latest(state: CurrentState, query: Annotated[StopsQuery, Query()]) -> Response:
+    stop = await _reader(state).latest(time.time(), query.robot or None)
+    return _to(state, stop)
+
+
+@router.get(
+    "/stops/alarm",
+    summary="To the story of a raise of an alarm",
+    responses=errors(403, 404, 422, 429, 503),
+    status_code=303,
+    response_class=RedirectResponse,
+)
+async def of_alarm(state: CurrentState, query: Annotated[AlarmQuery, Query()]) -> Response:
+    stop = await _reader(state).of_alarm(query.id, query.occurrence)
+    if stop is None:
+        raise NotFound(say("story_gone"))
+    return _to(state, stop)
+
+
+@router.get(
+    "/stops/{key}",
+    response_class=HTMLResponse,
+    summary="Why the machine stopped: what changed in the minute before, and what was first",
+    responses=errors(403, 404, 422, 429, 503),
+)
+async def story_page(
+    request: Request, state: CurrentState, key: Key, query: Annotated[StoryQuery, Query()]
+) -> Response:
+    reader = _reader(state)
+    story = await reader.story(*_sort_and_number(key))
+    end = await reader.end_of(story.stop)
+    names = reader.names(story.stop.robot)
+    page = FramedPage("stop.html", word("title"), f"/stops/{key}", "alarms")
+    language = caller_of(request).language
+    return framed_page(
+        request, state, page, story_context(story, end, names, bool(query.all), language)
+    )
+
+
+@router.get(
+    "/stops/{key}/story.json",
+    summary="The story of a stop as JSON",
+    responses=errors(403, 404, 422, 429, 503),
+)
+async def story_json(request: Request, state: CurrentState, key: Key) -> JSONResponse:
+    reader = _reader(state)
+    story = await reader.story(*_sort_and_number(key))
+    end = await reader.end_of(story.stop)
+    answer = story_answer(story, end, caller_of(request).language)
+    return JSONResponse(answer, headers={"cache-control": "no-store"})
+
+
+def _reader(state: AppState) -> StopReader:
+    return StopReader(state.fleet, state.log)
+
+
+def _to(state: AppState, stop: Stop | None) -> Response:
+    path = f"/stops/{stop.key}" if stop else "/stops"
+    return RedirectResponse(f"{state.root}{path}", status_code=303)
+
+
+def _sort_and_number(key: str) -> tuple[StopSort, int]:
+    sort, _, written = key.partition("-")
+    return sort, int(written)  # type: ignore[return-value]  # the path's pattern has the sorts
+
+
+def _by_day(stops: Sequence[Stop]) -> Iterator[tuple[Text, list[ShownStop]]]:
+    for day, of_day in groupby(stops, key=lambda stop: datetime.fromtimestamp(stop.at).date()):
+        yield (
+            day_name(day),
+            [
+                ShownStop(
+                    each.key, each.sort, format_time(each.at), iso_time(each.at), each.robot, each.text
+                )
+                for each in of_day
+            ],
+        )
+
+
+def story_context(
+    story: Story, end: float | None, names: PanelNames, is_whole: bool, language: str
+) -> StoryContext:
+    """The page of a story; `end` is when the stop was over, None while it is not known to be."""
+    short = story.short()
+    lines = story.lines if is_whole else short
+    count, every = number(str(len(short))), number(f"{len(story.lines):,d}")
+    duration = duration_text(float(round(end - story.stop.at))) if end is not None else ""
+    return StoryContext(
+        story=story,
+        at=format_datetime(story.stop.at),
+        lasted=word("stopped_for", duration=duration) if duration else "",
+        lines=[_shown(line, story) for line in lines],
+        is_whole=is_whole,
+        these=word("these", count=count),
+        every=word("all", count=every),
+        order=word("by_stamps" if story.by_stamps else "by_arrival"),
+        left_out=word("left_out", count=number(f"{story.left_out:,d}")) if story.left_out else "",
+        to_do=to_do(story, names, language),
+        alarm_word=alarm_word,
+        log_word=log_word,
+        word=word,
+    )
+
+
+def _shown(line: Line, story: Story) -> ShownLine:
+    event = line.event
+    beside = [part for part in (event.detail, who_of(event.by) if event.by else "") if part]
+    change: TextLike = ""
+    if event.before and event.after:
+        change = say("story_change", before=event.before, after=event.after)
+    return ShownLine(
+        _offset(line.offset_s, story),
+        event.sort,
+        SIGNS[event.sort],
+        event.priority if event.sort == "alarm" else 0,
+        event.text,
+        joined(beside, "between_names") if beside else "",
+        change,
+        line.is_first,
+        line.is_before,
+    )
+
+
+def _offset(seconds: float, story: Story) -> TextLike:
+    """Thousandths only where stamps have them."""
+    is_fine = story.by_stamps and abs(seconds) < 10.0
+    text = f"{seconds:.3f}" if is_fine else f"{seconds:.1f}"
+    return number(text.replace("-", MINUS), "s")
+
+
+def to_do(story: Story, names: PanelNames, language: str) -> ToDo:
+    """The steps of the first cause, or else of the stop: those of its alarm or interlock."""
+    for event in (story.first, *(line.event for line in story.lines if line.event.breaks)):
+        if event is not None and (advice := advice_of(event, names)):
+            text, picture = advice
+            return ToDo([line for line in render(text, language).splitlines() if line.strip()], picture)
+    return ToDo([], "")
+
+
+def advice_of(event: Event, names: PanelNames) -> tuple[TextLike, TextLike] | None:
+    """What the panel file says to do about an event, and its picture."""
+    if event.sort == "alarm":
+        alarm = names.alarms.get(panel_alarm(event.id))
+        return (alarm.action, alarm.picture or "") if alarm and alarm.action else None
+    if event.sort not in ("interlock", "condition"):
+        return None
+    interlock = next((each for each in names.panel.interlocks if each.id == event.id), None)
+    if interlock is not None:
+        return (interlock.advice, interlock.help.picture or "") if interlock.advice else None
+    condition = next((each for each in names.panel.own_conditions if each.id == event.id), None)
+    return (condition.action, "") if condition and condition.action else None
+
+
+def story_answer(story: Story, end: float | None, language: str) -> dict[str, Any]:
+    """A story for programs: times are RFC 3339, offsets seconds from its zero."""
+    stop, first = story.stop, story.first
+
+    def text(value: TextLike) -> str:
+        return str(localized(value, language))
+
+    return {
+        "stop": {
+            "key": stop.key,
+            "sort": stop.sort,
+            "id": stop.id,
+            "robot": stop.robot,
+            "text": text(stop.text),
+            "at": iso_time(stop.at),
+            "end": None if end is None else iso_time(end),
+        },
+        "sentence": text(story.sentence),
+        "first_cause": None if first is None else {"sort": first.sort, "id": first.id},
+        "not_told": story.why,
+        "ordered_by": "stamps" if story.by_stamps else "arrival",
+        "zero": iso_time(story.zero),
+        "left_out": story.left_out,
+        "lines": [
+            {
+                "offset_s": round(line.offset_s, 3),
+                "at": iso_time(line.event.at),
+                "sent": None if line.event.sent is None else iso_time(line.event.sent),
+                "sort": line.event.sort,
+                "id": line.event.id,
+                "text": text(line.event.text),
+                "detail": text(line.event.detail),
+                "before": text(line.event.before),
+                "after": text(line.event.after),
+                "by": line.event.by,
+                "first_cause": line.is_first,
+            }
+            for line in story.lines
+        ],
+    }
