@@ -31,6 +31,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("link",),
         ("view",),
         ("commands",),
+        ("stops",),
         ("history",),
         ("session",),
     ),

@@ -14,7 +14,7 @@ from fastapi.routing import APIRoute
 from app.web.requests import PAGE
 from app.web.route_tables import all_modules
 from tests.cell.recipes.panels import PANEL
-from tests.support.parts import ROOT, Server
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import panel_file, ready
 from tests.support.users import Browsers, add_user
 from tests.web.test_acts_by_form import HALL
@@ -37,6 +37,8 @@ type = "std_msgs/msg/Float64"
 text = "Air pressure low"
 low = 5.0
 confirm_act = "pin"
+[demo]
+"/air" = { values = [4.5] }
 """
 LANGUAGES: Final = ("en", "de", "ja")
 PIN: Final = "2580"
@@ -54,6 +56,8 @@ PAGES: Final = {
     "/places/{widget}": ("/places/goal", 200),
     "/recipes/{set}": ("/recipes/boxes", 200),
     "/signin": ("/signin", 200),
+    "/stops": ("/stops", 200),
+    "/stops/{key}": ("/stops/alarm-1", 200),
     "/users": ("/users", 200),
     "an unknown path": ("/nothing", 404),
     "a wrong query": ("/log?before=x", 422),
@@ -76,7 +80,9 @@ def signed_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client
     panel = panel_file(folder, PANEL + MORE + HALL)
     browsers = Browsers()
     with ready(Server(ROOT, KIOSK_DATA=str(data), KIOSK_PANEL=str(panel), KIOSK_MODE="demo")) as server:
-        yield browsers.signed_in(server.url, "Sato", pin=PIN)
+        client = browsers.signed_in(server.url, "Sato", pin=PIN)
+        until(lambda: client.get("/stops/alarm-1").status_code == 200, "the alarm is raised")
+        yield client
     browsers.close()
 
 
