@@ -34,7 +34,7 @@ KEY: Final = r"^(state|alarm|goal|link)-[1-9][0-9]{0,17}$"
 SIGNS: Final = {
     "state": "arrow-right", "interlock": "lock", "condition": "circle-dot", "alarm": "",
     "link": "unlink", "node": "unlink", "publisher": "unlink", "clock": "clock",
-    "press": "circle-dot", "refused": "lock", "goal": "flag", "control": "user",
+    "press": "pointer", "refused": "lock", "goal": "flag", "control": "user",
     "recipe": "clipboard-list", "server": "power",
 }  # fmt: skip
 Key = Annotated[str, Path(pattern=KEY, max_length=24)]

@@ -37,6 +37,7 @@ PREFIXES = (
     "log_page_",
     "places_",
     "recipes_",
+    "story_",
 )  # of codes that are put together
 SENTENCES = sentences(ENGLISH)
 
