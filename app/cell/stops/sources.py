@@ -31,6 +31,10 @@ CHANGE_WORDS: Final[Mapping[tuple[str, bool], str]] = {
     ("node", True): "story_node_lost",
     ("node", False): "story_node_back",
 }
+ALARM_WORDS: Final[Mapping[str, str]] = {
+    "returned": "story_alarm_returned",
+    "unknown": "story_alarm_unknown",
+}
 TOLD_FIRST: Final[Mapping[str, int]] = {"state": 1, "interlock": 2, "condition": 3}
 CONTROL_KINDS: Final[Mapping[str, str]] = {
     "control": "story_control",
@@ -154,7 +158,7 @@ def _change_text(names: PanelNames, row: Change) -> TextLike:
 def alarm_events(names: PanelNames, rows: Iterable[HistoryRow]) -> Iterator[Event]:
     """The events of an alarm's transitions: raised, returned."""
     for row in rows:
-        if row.event not in ("raised", "returned", "unknown"):
+        if row.event != "raised" and row.event not in ALARM_WORDS:
             continue
         record = json.loads(row.record)
         alarm = names.alarms.get(panel_alarm(row.id))
@@ -164,7 +168,7 @@ def alarm_events(names: PanelNames, rows: Iterable[HistoryRow]) -> Iterator[Even
             row.at,
             "alarm",
             row.id,
-            text if is_raise else say(f"story_alarm_{row.event}", alarm=text),
+            text if is_raise else say(ALARM_WORDS[row.event], alarm=text),
             joined(filter(None, [written_value(record), _limit(record)]), "between_names"),
             began_s=alarm.on_delay_s if alarm and is_raise else 0.0,
             breaks=is_raise,
