@@ -258,7 +258,7 @@ lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group build -o deploy/build.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group release -o deploy/release.lock
-	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --extra replay --extra mqtt --extra oidc --extra edit --group test -o tests/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --extra replay --extra mqtt --extra oidc --extra edit --extra postgres --group test -o tests/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group docs -o docs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros_nodes/requirements.in -o tests/ros_nodes/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/rosbridge_rs/requirements.in -o bench/peers/rosbridge_rs/requirements.lock

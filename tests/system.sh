@@ -19,6 +19,10 @@ has_libclang() { # libclang-cpp is another library
     ls -d /usr/lib/llvm-*/lib/* /usr/lib/*/* /usr/lib*/* 2>/dev/null | grep -Eq '/libclang(-[0-9.]+)?\.so'
 }
 
+has_postgresql() {
+    ls /usr/lib/postgresql/*/bin/initdb | grep -q .
+}
+
 has_faketime() {
     ls /usr/lib/*/faketime/libfaketimeMT.so.1 | grep -q .
 }
@@ -44,6 +48,7 @@ if [ "${1:-}" != browser ]; then
     need wtype test -e /usr/bin/wtype
     need swayidle test -e /usr/bin/swayidle
     need mosquitto test -e /usr/sbin/mosquitto
+    need postgresql has_postgresql
     need minisign minisign -v
     need nginx test -e /usr/sbin/nginx
     need caddy caddy version

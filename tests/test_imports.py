@@ -33,6 +33,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("commands",),
         ("stops",),
         ("history",),
+        ("forward",),
         ("session",),
     ),
     "tools": (
@@ -40,6 +41,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("scaffold",),
         ("robot",),
         ("editor",),
+        ("central",),
         ("cli",),
     ),
 }

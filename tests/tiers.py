@@ -30,7 +30,7 @@ ROBOT_FIXTURES: Final = frozenset(
     {
         *("domain", "cyclone_bridge", "own_cyclone_bridge", "cyclone_robots", "ros", "hiroz"),
         *("other_browser", "screens", "sway"),
-        *("broker", "proxies", "minisign", "systemd", "namespaces"),
+        *("broker", "postgres", "proxies", "minisign", "systemd", "namespaces"),
     }
 )
 BROWSER_FIXTURE: Final = "chromium"

@@ -7,7 +7,7 @@ copy of the log or an earlier head is needed from elsewhere.
 
 import json
 import sqlite3
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -131,7 +131,7 @@ def verify(
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
             entries = _reported(_entries(db), entry_count(db), progress)
-            return _Chain(genesis, known_head, SignedPart(keys), against).check(entries)
+            return Chain(genesis, known_head, SignedPart(keys), against).check(entries)
     finally:
         db.close()
 
@@ -151,7 +151,7 @@ def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
             raise LogError(f"the file has what is no entry: {error}") from error
 
 
-class _Chain:
+class Chain:
     """Verifies entries from the oldest on; keeps only the last two hashes."""
 
     def __init__(
@@ -159,7 +159,7 @@ class _Chain:
         genesis: str,
         known_head: str,
         signed: SignedPart,
-        against: Callable[[Entry], str] | None,
+        against: Callable[[Entry], str] | None = None,
     ) -> None:
         self._genesis = genesis
         self._known_head = known_head
@@ -172,27 +172,50 @@ class _Chain:
         self._seq = 0
         self._count = 0
 
-    def check(self, entries: Iterator[Entry]) -> Verified:
+    def check(self, entries: Iterable[Entry]) -> Verified:
+        """Verifies all entries, up to the first fault."""
         for entry in entries:
-            fault = self._fault(entry) or self._signed.fault(entry)
-            if fault := fault or (self._against(entry) if self._against else ""):
+            if fault := self.fault(entry):
                 return self._verified(fault)
-            self._first = self._first or entry
-            if self._known_head in (entry.hash, entry.prev):
-                self._known_head = ""
-            self._begins = self._begins or self._explains_begin(self._first, entry)
-            self._kinds.add(entry.kind)
-            self._last, self._seq = (entry.prev, entry.hash), entry.seq
-            self._count += 1
+        return self._verified(self.end_fault())
+
+    def fault(self, entry: Entry) -> str:
+        """What is wrong with the next entry, "" if nothing; then it counts."""
+        fault = self._fault(entry) or self._signed.fault(entry)
+        if fault := fault or (self._against(entry) if self._against else ""):
+            return fault
+        self._first = self._first or entry
+        if self._known_head in (entry.hash, entry.prev):
+            self._known_head = ""
+        self._begins = self._begins or self._explains_begin(self._first, entry)
+        self._kinds.add(entry.kind)
+        self._accept(entry)
+        return ""
+
+    def _accept(self, entry: Entry) -> None:
+        self._last, self._seq = (entry.prev, entry.hash), entry.seq
+        self._count += 1
+
+    def begin_at(self, entry: Entry) -> str:
+        """Goes on with an entry that had a fault, as the first of a chain that needs no explanation;
+        returns what is wrong with it alone."""
+        self._first, self._begins = None, True
+        fault = self._fault(entry)
+        self._first = entry
+        self._accept(entry)
+        return fault
+
+    def end_fault(self) -> str:
+        """What is wrong with the whole, after the last entry."""
         if self._first is None:
-            return self._verified("it has no entries: a log begins with number 1, or says why not")
+            return "it has no entries: a log begins with number 1, or says why not"
         if not self._begins:
-            return self._verified(
+            return (
                 f"what stood before entry {self._first.seq} was removed, by none of the log's own rules"
             )
         if self._known_head:
-            return self._verified(f"no entry has the head {self._known_head}: the newest were removed")
-        return self._verified(self._signed.end_fault())
+            return f"no entry has the head {self._known_head}: the newest were removed"
+        return self._signed.end_fault()
 
     def _verified(self, fault: str) -> Verified:
         return Verified(self._count, self._last[1], fault, self._signed.result)

@@ -36,6 +36,7 @@ VARIABLES = (
     "LOG_COPY",
     "SYSLOG",
     "SYSLOG_CA",
+    "FORWARD",
     "WITHOUT",
 )
 PROTECTIONS = ("tls", "users")  # that a server which listens beyond loopback has
@@ -74,6 +75,7 @@ class Settings:
     log_copy: Path | None = None
     syslog: tuple[str, int] | None = None
     syslog_ca: Path | None = None
+    forward: Path | None = None
     without: Annotated[tuple[str, ...], PUBLIC] = ()
 
     def data_folder(self, mode: Mode) -> Path:
@@ -108,6 +110,7 @@ class Settings:
             log_copy=_parse_path(env, "KIOSK_LOG_COPY", None),
             syslog=_parse_syslog(env.get("KIOSK_SYSLOG", "")),
             syslog_ca=_parse_path(env, "KIOSK_SYSLOG_CA", None),
+            forward=_parse_path(env, "KIOSK_FORWARD", None),
             without=tuple(_parse_without(env.get("KIOSK_WITHOUT", ""))),
         )
 

@@ -4,6 +4,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from itertools import product
+from typing import TYPE_CHECKING
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from prometheus_client.core import (
@@ -19,6 +20,9 @@ from app.cell.permission.robot_options import options_now
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.alarms import Alarms
 from app.cell.session.fleet import Fleet
+
+if TYPE_CHECKING:
+    from app.cell.forward.status import ForwardStatus
 from app.web.metrics import Metrics
 
 
@@ -54,6 +58,8 @@ class _Of(Collector):
             yield from _of_alarms(metrics.fleet.alarms)
             if metrics.fleet.alarms.mqtt.address:
                 yield from _of_mqtt(metrics.fleet.alarms.mqtt)
+            if metrics.fleet.forward is not None:
+                yield from _of_forward(metrics.fleet.forward.status)
 
 
 def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
@@ -89,6 +95,25 @@ def _of_mqtt(mqtt: AlarmMqtt) -> Iterator[Metric]:
     )
     yield CounterMetricFamily(
         "kiosk_alarms_mqtt_dropped", "Transitions that found no room", value=mqtt.dropped
+    )
+
+
+def _of_forward(status: "ForwardStatus") -> Iterator[Metric]:
+    yield GaugeMetricFamily(
+        "kiosk_forward_connected", "1 while entries reach the central database", value=status.connected
+    )
+    unsent = GaugeMetricFamily(
+        "kiosk_forward_unsent", "Rows that the central database lacks", labels=["stream"]
+    )
+    for stream, rows in status.unsent.items():
+        unsent.add_metric([stream], rows)
+    yield unsent
+    about = "About how many bytes the rows have that the central database lacks"
+    yield GaugeMetricFamily("kiosk_forward_unsent_bytes", about, value=status.size)
+    about = "The age of the oldest row that the central database lacks"
+    yield GaugeMetricFamily("kiosk_forward_lag_seconds", about, value=status.lag_s(time.time()))
+    yield CounterMetricFamily(
+        "kiosk_forward_sent", "Rows that were sent to the central database", value=status.sent
     )
 
 

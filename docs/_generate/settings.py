@@ -42,6 +42,11 @@ ABOUT: Final = {
         "The certificate authority of that server, as a PEM file.",
         "the system's authorities",
     ),
+    "FORWARD": (
+        "A TOML file that says to which [central database](../how-to/plant.md) the panel sends what it "
+        "keeps.",
+        "none: nothing is sent",
+    ),
     "WITHOUT": (
         "`tls`, `users` or `tls,users`: listen beyond this machine without them, as behind a proxy of "
         "your own.",

@@ -147,8 +147,9 @@ def link_state(robot: RobotState, now: float) -> tuple[Any, ...]:
     )
 
 
-# The panel's own alarms, of the operator's log, the disk, the clock, certificates, the broker of MQTT,
-# the users' file, tried sign-ins and the alarms themselves. Pure: from what the server sees to entries.
+# The panel's own alarms, of the operator's log, the disk, the clock, certificates, the broker of
+# MQTT, the central database, the users' file, tried sign-ins and the alarms themselves. Pure: from
+# what the server sees to entries.
 
 OwnAlarm = Literal[
     "panel_log",
@@ -156,6 +157,7 @@ OwnAlarm = Literal[
     "panel_clock",
     "panel_certificate",
     "panel_mqtt",
+    "panel_forward",
     "panel_users",
     "panel_sign_in",
     "panel_alarms_lost",
@@ -167,6 +169,7 @@ PRIORITIES: Final[dict[OwnAlarm, int]] = {
     "panel_clock": 3,
     "panel_certificate": 2,
     "panel_mqtt": 3,
+    "panel_forward": 3,
     "panel_users": 2,
     "panel_sign_in": 2,
     "panel_alarms_lost": 2,
@@ -176,6 +179,7 @@ UNKEPT: Final = frozenset({"panel_log", "panel_disk"})
 JUMP_S: Final = 5.0  # a smaller step of the clock is not raised
 CERTIFICATE_DAYS: Final = 30  # before its end, a certificate raises the alarm
 BROKER_WITHIN_S: Final = 30.0  # without a connection to the broker, the alarm is raised
+FORWARDS_WITHIN_S: Final = 300.0  # without a connection to the central database, the alarm is raised
 SHOWN_ADDRESSES: Final = 3
 NAMED: Final = 10  # ids in a sentence
 ENOUGH: Final = 1.1  # of the free space below which the alarm is raised, until it returns
@@ -250,6 +254,14 @@ def broker_entry(address: str, why: str, lost_s: float) -> AlarmEntry:
     cause = say("own_mqtt_lost", address=address, within=within, why=why)
     texts = OwnTexts(say("own_mqtt"), cause, say("own_mqtt_unpublished"), say("own_mqtt_action"))
     return _entry("panel_mqtt", lost_s >= BROKER_WITHIN_S, texts)
+
+
+def forward_entry(address: str, why: TextLike, lost_s: float) -> AlarmEntry:
+    """Of the central database, to which nothing could be sent for `lost_s` seconds."""
+    within = format_age(round(FORWARDS_WITHIN_S))
+    cause = say("own_forward_lost", address=address, within=within, why=why)
+    texts = OwnTexts(say("own_forward"), cause, say("own_forward_kept"), say("own_forward_action"))
+    return _entry("panel_forward", lost_s >= FORWARDS_WITHIN_S, texts)
 
 
 def users_entry(fault: TextLike) -> AlarmEntry:

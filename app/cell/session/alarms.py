@@ -37,6 +37,7 @@ from app.cell.alarms.sources import (
     certificate_entry,
     clock_entry,
     disk_entry,
+    forward_entry,
     full_entry,
     is_kept,
     log_entry,
@@ -60,8 +61,8 @@ from app.system.texts import TextLike, joined, say
 from app.system.used_certificates import NO_FILES, UsedCertificates, readable
 
 # What the server sees of itself, for the panel's own alarms: its log, its disk, its clock, the
-# certificates that it uses, its connection to the broker of MQTT, its users, their sign-ins and its
-# alarms.
+# certificates that it uses, its connections to the broker of MQTT and to the central database, its
+# users, their sign-ins and its alarms.
 
 log = logging.getLogger("kiosk.alarms")
 
@@ -100,6 +101,24 @@ class SignIns(Protocol):
     def guessed(self) -> tuple[str, Sequence[str]] | None: ...
 
 
+class ForwardStatus(Protocol):
+    """How the forwarding to the central database goes; `fault` is "" if it does."""
+
+    @property
+    def address(self) -> str: ...
+    @property
+    def connected(self) -> bool: ...
+    @property
+    def fault(self) -> TextLike: ...
+
+
+class Forwarding(Protocol):
+    """What sends to the central database."""
+
+    @property
+    def status(self) -> ForwardStatus: ...
+
+
 class OwnAlarms:
     """The panel's own alarms, from `start` to `stop`. Used on the event loop only."""
 
@@ -111,8 +130,11 @@ class OwnAlarms:
         engine: AlarmEngine,
         evaluate: Callable[[], None],
         certificates: UsedCertificates = NO_FILES,
+        forwarding: Forwarding | None = None,
     ) -> None:
         self._certificates = certificates
+        self._forwarding = forwarding
+        self._forwarded_at = 0.0  # the last time that it did, in monotonic seconds
         self._certificate_fault = ""
         self._rules = rules
         self._folder = folder
@@ -141,6 +163,9 @@ class OwnAlarms:
         self._set("panel_clock", clock_entry(0.0, 0.0))
         if not broker.address:
             self._set("panel_mqtt", broker_entry("", "", 0.0))
+        self._forwarded_at = time.monotonic()
+        if self._forwarding is None:
+            self._set("panel_forward", forward_entry("", "", 0.0))
         if not self._certificates.all_files:
             self._set("panel_certificate", certificate_entry("", FAR, datetime.now(UTC)))
         self._check_log()
@@ -199,6 +224,7 @@ class OwnAlarms:
         self._timer = asyncio.get_running_loop().call_later(CHECK_S, self._check)
         self._check_clock()
         self._check_broker()
+        self._check_forwarding()
         if self._sign_ins is not None:
             self._check_sign_ins(self._sign_ins)
         self._check_lost()
@@ -228,6 +254,15 @@ class OwnAlarms:
         if broker.is_connected:
             self._connected_at = now
         self._set("panel_mqtt", broker_entry(broker.address, broker.state, now - self._connected_at))
+
+    def _check_forwarding(self) -> None:
+        if self._forwarding is None:
+            return
+        status, now = self._forwarding.status, time.monotonic()
+        if status.connected:
+            self._forwarded_at = now
+        entry = forward_entry(status.address, status.fault, now - self._forwarded_at)
+        self._set("panel_forward", entry)
 
     async def _check_disk(self) -> None:
         """Measures on a thread: a disk may not answer."""
@@ -318,12 +353,20 @@ class Alarms:
         self._shown.selections.add_robot(robot_id, self._panel)
         return robot_alarms
 
-    async def start(self, folder: Path, operators_log: Log, used: UsedCertificates = NO_FILES) -> None:
+    async def start(
+        self,
+        folder: Path,
+        operators_log: Log,
+        used: UsedCertificates = NO_FILES,
+        forwarding: Forwarding | None = None,
+    ) -> None:
         """Loads the alarms that stood when the server ended; nothing for a panel without alarms."""
         if not self._panel.may_raise:
             return
         if (rules := self._panel.alarm_rules).panel:
-            self._own = OwnAlarms(rules, folder, operators_log, self.engine, self.evaluate, used)
+            self._own = OwnAlarms(
+                rules, folder, operators_log, self.engine, self.evaluate, used, forwarding
+            )
             self._own.start(self.mqtt)
         self.mqtt.start()
         events = DiskEvents(

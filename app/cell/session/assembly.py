@@ -25,6 +25,7 @@ from app.system.used_certificates import ServedCertificate, UsedCertificates
 if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
     from app.cell.history.trends import TrendWriter
+    from app.cell.session.forward_process import ForwardProcess
 
 log = logging.getLogger("kiosk")
 
@@ -108,13 +109,14 @@ async def open_fleet(
         trends = _trend_disk(settings, panel, fleet)
         fleet.states = settings.data_folder(mode_of(settings, panel)) / STATES
         states = StateRecorder(fleet.states, fleet.sessions) if panel.state else None
+        fleet.forward = _forward(settings, panel)
         try:
             if recordings is not None:
                 recordings.start()
             if trends is not None:
                 await trends.start()
             folder = settings.data_folder(mode_of(settings, panel))
-            await fleet.alarms.start(folder, oplog, certificates)
+            await fleet.alarms.start(folder, oplog, certificates, fleet.forward)
             await fleet.recipes.start(folder, oplog)
             if fleet.place_file is not None:
                 await fleet.place_file.start(folder)
@@ -123,11 +125,15 @@ async def open_fleet(
                 states.start()
             if fleet.journal is not None:
                 fleet.journal.start(fleet.states)
+            if fleet.forward is not None:
+                fleet.forward.start()
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
             yield fleet
         finally:
+            if fleet.forward is not None:
+                await fleet.forward.stop()
             if states is not None:
                 await states.stop()
             await fleet.stop()
@@ -151,6 +157,17 @@ def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
 
     folder = settings.data_folder(mode_of(settings, panel)) / "recordings"
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
+
+
+def _forward(settings: Settings, panel: Panel) -> "ForwardProcess | None":
+    """The forwarder, if the settings name a central database; SettingsError if they can't be used."""
+    if settings.forward is None:
+        return None
+    from app.cell.forward.config import read_forward
+    from app.cell.session.forward_process import ForwardProcess
+
+    config = read_forward(settings.forward)
+    return ForwardProcess(settings.forward, data_folder(settings, panel), config.connection.address)
 
 
 def _trend_disk(settings: Settings, panel: Panel, fleet: Fleet) -> "TrendWriter | None":

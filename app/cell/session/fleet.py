@@ -45,6 +45,7 @@ from app.system.texts import TextLike, joined, say
 
 if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
+    from app.cell.session.forward_process import ForwardProcess
     from app.cell.session.maps import MapPictures
     from app.cell.session.place_file import SavedPlaceFile
     from app.cell.stops.changes import ChangeJournal
@@ -190,6 +191,7 @@ class Fleet:
         self.group_stops = GroupStops()
         self.confirm_locks = ConfirmLocks()  # locked until the users are known
         self.states: Path | None = None  # the file of the machine's states
+        self.forward: ForwardProcess | None = None  # to the plant's central database
         server = ServerParts(
             panel,
             revision,

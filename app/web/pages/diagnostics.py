@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Annotated, Any, Final, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypedDict, TypeVar
 from urllib.parse import urlencode
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
@@ -47,6 +47,9 @@ from app.system.texts import (
 from app.system.version import installed_version
 from app.web.acts import ActBody
 from app.web.answers import ActAnswer
+
+if TYPE_CHECKING:
+    from app.cell.forward.status import ForwardStatus
 
 # Values of the page of diagnostics as texts, in no language yet.
 
@@ -164,6 +167,12 @@ def undecodable_text(row: TopicRow) -> TextLike:
     )
 
 
+def forward_waiting(status: "ForwardStatus") -> Text:
+    """What the central database lacks."""
+    about = {"size": size_text(status.size), "age": age_text(status.lag_s(time.time()))}
+    return word("forward_waiting", rows=number(str(status.rows)), **about)
+
+
 TEXTS: Final[dict[str, Any]] = {
     "word": word,
     "look_word": look_word,
@@ -175,6 +184,7 @@ TEXTS: Final[dict[str, Any]] = {
     "finding_text": finding_text,
     "remedy_text": remedy_text,
     "undecodable_text": undecodable_text,
+    "forward_waiting": forward_waiting,
     "time_text": lambda wall: format_time(wall) if wall else NOTHING,
 }
 
@@ -383,9 +393,27 @@ class MqttAnswer(BaseModel):
     dropped: int
 
 
+class ForwardAnswer(BaseModel):
+    """The central database: `fault` is why nothing is sent, `since` when, `note` what is not as it
+    should be. `rows` are not sent, the oldest of the time `oldest`, in about so many `bytes`;
+    `unsent` are their numbers by stream. `sent` counts those of this run."""
+
+    address: str
+    connected: bool
+    fault: str
+    note: str
+    since: AwareDatetime | None
+    rows: int
+    oldest: AwareDatetime | None
+    bytes: int
+    unsent: dict[str, int]
+    sent: int
+
+
 class DiagnosticsAnswer(BaseModel):
     """`versions` are by the name of the program; `looks` are the keys of topics that are looked into
-    now. `mqtt` is null for a panel without `[alarms.mqtt]`."""
+    now. `mqtt` is null for a panel without `[alarms.mqtt]`, `forward` for one without a central
+    database."""
 
     versions: dict[str, str]
     links: list[LinkAnswer]
@@ -397,6 +425,7 @@ class DiagnosticsAnswer(BaseModel):
     doctor: DoctorAnswer
     looks: list[str]
     mqtt: MqttAnswer | None
+    forward: ForwardAnswer | None
 
 
 class LookedMessageAnswer(BaseModel):

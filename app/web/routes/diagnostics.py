@@ -57,6 +57,7 @@ from app.web.requests import JSON, PAGE, FormFields, described_body, errors
 
 if TYPE_CHECKING:
     from app.cell.history.recording import Recorder
+    from app.cell.session.forward_process import ForwardProcess
 
 
 # What the page of diagnostics shows, as JSON for programs.
@@ -108,6 +109,25 @@ def mqtt_json(mqtt: AlarmMqtt) -> dict[str, Any] | None:
         "waiting": mqtt.waiting,
         "published": mqtt.published,
         "dropped": mqtt.dropped,
+    }
+
+
+def forward_json(forward: "ForwardProcess | None") -> dict[str, Any] | None:
+    """The content of a `ForwardAnswer`; None for a panel without a central database."""
+    if forward is None:
+        return None
+    status = forward.status
+    return {
+        "address": status.address,
+        "connected": status.connected,
+        "fault": status.fault,
+        "note": status.note,
+        "since": _at(status.since),
+        "rows": status.rows,
+        "oldest": None if status.oldest is None else iso_time(status.oldest),
+        "bytes": status.size,
+        "unsent": status.unsent,
+        "sent": status.sent,
     }
 
 
@@ -200,6 +220,7 @@ async def diagnostics(
         return await _page(request, state, session, query)
     content = diagnostics_json(session, await _survey(session), state.doctor, versions())
     content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
+    content["forward"] = forward_json(state.fleet.forward)
     return await rows_answer(request, lambda: content, sys.maxsize)
 
 
@@ -278,6 +299,7 @@ async def _page(
     more = {
         "act_refused": said_of(query.act, [state.fleet.first.diagnostic_acts]),
         "mqtt": state.fleet.alarms.mqtt,
+        "forward": state.fleet.forward.status if state.fleet.forward else None,
         "shared": _shared(request, state, query.robot),
     }
     return framed_page(request, state, page, {**context, **TEXTS, **more})

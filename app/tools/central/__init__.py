@@ -1,0 +1,1 @@
+"""The central database: its schema in files of SQL, verification and pruning."""
