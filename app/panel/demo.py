@@ -194,6 +194,8 @@ DRIVING: Final = Story(
     },
     services={"/manual_mode": SWITCH, "/obstacle": SWITCH},
     actions={
+        "/follow_waypoints": "nav2_msgs/action/FollowWaypoints",
+        "/navigate_through_poses": "nav2_msgs/action/NavigateThroughPoses",
         "/navigate_to_pose": "nav2_msgs/action/NavigateToPose",
         "/dock_robot": "nav2_msgs/action/DockRobot",
         "/undock_robot": "nav2_msgs/action/UndockRobot",

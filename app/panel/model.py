@@ -36,13 +36,14 @@ from app.panel.widgets.parameter import (
     listed_parameter,
 )
 from app.panel.widgets.parts import parts_of
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput, PlaceInput
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.recipe_load import RecipeLoad, loads_of
 from app.panel.widgets.robot_options import ListingService
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.switch import confirms_of
 from app.panel.widgets.templated import is_stop
+from app.panel.widgets.tour import PATH_TYPE, Tour
 from app.system.errors import NotFound
 from app.system.pictures import picture_files, shipped_pictures
 from app.system.texts import PanelText
@@ -351,12 +352,23 @@ class Panel(PanelKeys):
     def map_shapes(self) -> dict[str, str]:
         """Topic → type of the layers of maps that are shapes, not grids."""
         layers = (layer for view in self.map_views.values() for layer in view.layers)
-        return {layer.topic: layer.type for layer in layers if layer.type != GRID_TYPE}
+        tours = {tour.topic: PATH_TYPE for tour in self.tours if tour.topic is not None}
+        return {layer.topic: layer.type for layer in layers if layer.type != GRID_TYPE} | tours
+
+    @cached_property
+    def map_inputs(self) -> tuple[MapInput, ...]:
+        """The inputs whose value is a place or several."""
+        return tuple(w for w in self.widgets() if isinstance(w, MapInput))
 
     @cached_property
     def place_inputs(self) -> tuple[PlaceInput, ...]:
-        """The inputs whose value is a place."""
-        return tuple(w for w in self.widgets() if isinstance(w, PlaceInput))
+        """Of these, those whose value is a place."""
+        return tuple(w for w in self.map_inputs if isinstance(w, PlaceInput))
+
+    @cached_property
+    def tours(self) -> tuple[Tour, ...]:
+        """Of these, those whose value is several places."""
+        return tuple(w for w in self.map_inputs if isinstance(w, Tour))
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""

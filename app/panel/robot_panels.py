@@ -7,7 +7,7 @@ from app.panel.model import Panel
 from app.panel.widgets.displays import Static
 from app.panel.widgets.families import BaseWidget, Command, DisplayWidget, EntryWidget, Input
 from app.panel.widgets.inputs import SelectInput
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput
 
 
 def widget_robots(panel: Panel) -> Mapping[str, str]:
@@ -56,7 +56,7 @@ def is_shared(widget: BaseWidget) -> bool:
     robot has is that robot's, and so is a place on its map."""
     if isinstance(widget, SelectInput) and widget.options_from is not None:
         return False
-    return isinstance(widget, Input | Static) and not isinstance(widget, PlaceInput)
+    return isinstance(widget, Input | Static) and not isinstance(widget, MapInput)
 
 
 def panel_of(panel: Panel, robot_id: str | None) -> Panel:

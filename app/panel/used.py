@@ -8,7 +8,8 @@ from app.panel.model import Panel
 from app.panel.template import input_ids
 from app.panel.widgets.families import Input
 from app.panel.widgets.inputs import SelectInput
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput
+from app.panel.widgets.service_action import Action
 
 AnyInput = TypeVar("AnyInput", bound=Input)
 
@@ -57,9 +58,25 @@ def selects_by_command(panel: Panel) -> Mapping[str, tuple[SelectInput, ...]]:
     return _by_command(panel, panel.listed_selects)
 
 
-def places_by_command(panel: Panel) -> Mapping[str, tuple[PlaceInput, ...]]:
+def places_by_command(panel: Panel) -> Mapping[str, tuple[MapInput, ...]]:
     """The places that a command's message has, by the command's id."""
-    return _by_command(panel, panel.place_inputs)
+    return _by_command(panel, panel.map_inputs)
+
+
+def actions_of_tours(panel: Panel) -> Mapping[str, tuple[Action, ...]]:
+    """The actions whose goals a tour shows, by the tour's id: the one that it names, else those that
+    send it."""
+    if not panel.tours:
+        return {}
+    actions = [command for command in panel.commands if isinstance(command, Action)]
+    return {
+        tour.id: tuple(
+            action
+            for action in actions
+            if (action.id == tour.action if tour.action else tour.id in input_ids(action))
+        )
+        for tour in panel.tours
+    }
 
 
 def _by_command(panel: Panel, inputs: tuple[AnyInput, ...]) -> Mapping[str, tuple[AnyInput, ...]]:

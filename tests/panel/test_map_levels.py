@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import pytest
 
+from app.panel.file.load import faults_of_text
 from tests.panel.test_map_places import CORNERS, PIT, faults
 
 pytestmark = pytest.mark.promise("panel file")
@@ -109,3 +110,49 @@ def _go() -> dict[str, Any]:
     keys = {"id": "go", "kind": "publish", "label": "Go", "topic": "/goal_pose"}
     message = {"header": {"frame_id": "{goal.frame}"}, "pose": "{goal.pose}"}
     return {**keys, "type": "geometry_msgs/msg/PoseStamped", "message": message}
+
+
+LEVEL_KEYS: Final = """topic = "/level"
+type = "std_msgs/msg/String"
+field = "data"
+"""
+MAP_KEYS: Final = """title = "Cell"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "building"
+kind = "map"
+label = "Building"
+"""
+LEVEL_TABLES: Final = """[[page.widget.level]]
+id = "ground"
+label = "Ground"
+topic = "/ground/map"
+[[page.widget.level]]
+id = "upper"
+label = "Upper"
+topic = "/upper/map"
+"""
+PLAN_KEYS: Final = """[page.widget.plan]
+src = "plan.svg"
+resolution = 0.1
+level = "upper"
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "first"),
+    [
+        (MAP_KEYS + LEVEL_KEYS + LEVEL_TABLES, "topic"),
+        (MAP_KEYS + LEVEL_TABLES + PLAN_KEYS + LEVEL_KEYS, "plan.topic"),
+        (
+            MAP_KEYS + LEVEL_TABLES + LEVEL_KEYS.partition("\n")[2] + "max_age_s = 2.0\n",
+            "level[1].type",
+        ),
+    ],
+)
+def test_a_missing_header_of_the_robots_level_is_one_fault_that_names_it(text: str, first: str) -> None:
+    (fault,) = faults_of_text(text, folder=Path())
+    assert fault.place == f"page[0].widget[0].{first}"
+    assert "are keys of page.widget.robot_level: is its header missing above?" in str(fault)

@@ -84,7 +84,7 @@ def test_the_shipped_panel_is_good_and_a_demo() -> None:
     ]  # fmt: skip
     placed = {w.kind for w in panel.widgets()} - {"state"}  # of the header
     # It has no picture and drives nowhere; its alarms have the frame's line and a page of their own.
-    assert placed == set(KINDS) - {"image", "map", "place", "alarm_line", "alarm_list"}
+    assert placed == set(KINDS) - {"image", "map", "place", "tour", "alarm_line", "alarm_list"}
     assert panel.interlocks[0].id == "operation"
     assert [w.id for w in panel.commands if w.interlocks == ("operation",)][:2] == [
         "operation1", "operation2",

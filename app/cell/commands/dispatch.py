@@ -23,12 +23,13 @@ from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.parameter import SET, Parameter
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput, PlaceInput
 from app.panel.widgets.publish import Confirm, Publish, PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.templated import is_stop
+from app.panel.widgets.tour import Tour
 from app.records.entry import FinalCheck, Outcome
 from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
@@ -45,7 +46,7 @@ async def assume_flushed() -> bool:
 
 
 if TYPE_CHECKING:
-    from app.cell.permission.goal_places import Goal
+    from app.cell.permission.goal_places import Goal, TourGoal
 
 
 class PreparedPress(NamedTuple):
@@ -119,7 +120,7 @@ class Dispatcher:
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
             Input: lambda widget, value: widget.sent_value(widget.check_value(value)),
             SelectInput: self._check_option,
-            PlaceInput: lambda widget, value: self._goal(widget, value).parts,
+            MapInput: lambda widget, value: self._goal(widget, value).parts,
             Parameter: self._parameters.check_value,
             Step: self._check_step,
             Switch: lambda widget, value: widget.check_value(value),
@@ -138,13 +139,18 @@ class Dispatcher:
             return chosen
         raise InputError(say("input_option_gone", label=widget.label, given=format_value(chosen)))
 
-    def _goal(self, widget: PlaceInput, value: Any) -> "Goal":
+    def _goal(self, widget: MapInput, value: Any) -> "Goal | TourGoal":
         """What a place sends; InputError for a value that chooses nothing, PressRefused with the reason
         why nothing is sent to it now. Imported only where a panel has places, for a faster start."""
-        from app.cell.permission.goal_places import Goal, goal_of
+        from app.cell.permission.goal_places import Goal, TourGoal, goal_of, tour_of
 
-        goal = goal_of(widget, value, self._robot, self._monotonic())
-        if not isinstance(goal, Goal):
+        now = self._monotonic()
+        goal: Goal | TourGoal | TextLike = ""
+        if isinstance(widget, PlaceInput):
+            goal = goal_of(widget, value, self._robot, now)
+        elif isinstance(widget, Tour):
+            goal = tour_of(widget, value, self._robot, now)
+        if not isinstance(goal, Goal | TourGoal):
             raise PressRefused(goal, "interlock")
         return goal
 

@@ -10,9 +10,9 @@ import math
 import time
 import uuid
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from app.cell.commands.press import PressHandle
 from app.cell.commands.services import LATE_S, with_fields, with_reply
@@ -36,6 +36,9 @@ from app.system.concurrency import end_tasks, keep_running, spawn_logged
 from app.system.errors import DecodeError, LinkError, LogError
 from app.system.log import RobotLog
 from app.system.texts import Text, TextLike, hint, joined, number, say
+
+if TYPE_CHECKING:
+    from app.cell.commands.waypoints import WaypointTracker
 
 # One goal of an action: its state, and the command status that its widget shows. Pure.
 #
@@ -64,7 +67,7 @@ def goal_id(entry: str) -> uuid.UUID:
 @dataclass(slots=True)
 class Goal:
     """A goal that was sent. `state` is None until it is known; `is_known` is true once the robot has
-    reported the goal.
+    reported the goal. `sent` are the fields of its message, None for one of before the server's start.
 
     `cut` is done when the action server or the connection is lost: with a sentence, or "" for a lost
     connection. `doubt` is the sentence while it is unknown whether the goal still runs, after a lost
@@ -78,7 +81,9 @@ class Goal:
     correct: OnCorrection
     state: int | None = None
     is_known: bool = False
+    sent: Mapping[str, Any] | None = None
     doubt: TextLike = ""
+    missed: Mapping[int, int] = field(default_factory=dict)  # poses that its result calls so
     feedback_text: TextLike = ""
     fraction: float | None = None
     greatest: float = 0.0  # value of a progress that falls
@@ -145,7 +150,10 @@ log = logging.getLogger("kiosk.actions")
 
 CANCEL: Final = "action_msgs/srv/CancelGoal"
 STATUS: Final = "status"
+MAX_NAMED: Final = 20  # of the poses that were missed
 RESULT: Final = "result."  # prefix of the result's fields in the response of `get_result`
+MISSED: Final = ("missed_waypoints", "waypoint_statuses")  # fields of a result
+MAX_MISSED_BYTES: Final = 200_000
 NO_SUCH_GOAL: Final = frozenset({2, 3})  # ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
 
 Query = asyncio.Future[bytes | None]
@@ -250,6 +258,18 @@ class ActionClient:
             self._log.error("%s: %s", widget.action, error)
             return None
 
+    def missed(self, widget: Action, reply: bytes) -> Mapping[int, int]:
+        """The poses that a result calls missed, with their error codes; none of one that is too large
+        to be read at once."""
+        types = self._interfaces.action_types(widget.type)
+        known = {field.name for field in self._interfaces.structures[types.result].fields}
+        if not known & {*MISSED} or len(reply) > MAX_MISSED_BYTES:
+            return {}
+        from app.cell.robot.waypoints import missed_of
+
+        message = self._decoded(widget, types.get_result_response, reply)
+        return {} if message is None else missed_of(message.result)
+
     def _decoded(self, widget: Action, type_name: str, reply: bytes) -> Any:
         try:
             return self._interfaces.decode(type_name, reply)
@@ -344,6 +364,7 @@ class ResultWaiter:
             return Outcome("unknown", say("call_response_unreadable", wanted=goal.widget.type))
         status = fields.get(STATUS)
         goal.state = status if status in ENDS else UNKNOWN
+        goal.missed = self._services.missed(goal.widget, reply)
         if status not in ENDS:
             return Outcome("unknown", say("goal_forgotten") if goal.is_known else say("goal_not_known"))
         outcome, ended, had_ended = ENDS[status]
@@ -351,6 +372,9 @@ class ResultWaiter:
         widget, code = goal.widget, fields.get(RESULT + ERROR_CODE)
         error = known_value(widget.type, ERROR_CODE, code) if outcome == "aborted" else None
         text = error or with_fields(widget.result, fields, RESULT, self._robot.texts, widget.type)
+        if goal.missed and not text:
+            numbers = ", ".join(str(index + 1) for index in sorted(goal.missed)[:MAX_NAMED])
+            text = say("goal_missed", count=len(goal.missed), numbers=numbers)
         return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), text))
 
     async def _result(self, goal: Goal) -> bytes | None:
@@ -397,6 +421,12 @@ class GoalTracker:
         self._latest: dict[str, Goal] = {}  # by widget
         self._feedback: dict[str, Topic] = {}  # by widget
         self._states: dict[str, Sample] = {}  # by action: the last status message
+        self._waypoints = self._make_waypoints() if robot.tour_actions else None
+
+    def _make_waypoints(self) -> "WaypointTracker":
+        from app.cell.commands.waypoints import WaypointTracker  # few panels have a tour
+
+        return WaypointTracker(self._interfaces, self._robot, self._is_own, self._status_set)
 
     def register(self, handlers: SampleHandlers, actions: Iterable[str]) -> None:
         """Handles the feedback and status of these actions from now on."""
@@ -434,13 +464,15 @@ class GoalTracker:
         handle.final_check()
         query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
-        goal = Goal(widget, handle.press_id, own_id, cut, handle.correct)
+        goal = Goal(widget, handle.press_id, own_id, cut, handle.correct, sent=fields)
         self._latest[widget.id] = goal
         self._show(goal, CommandStatus(busy=True, text=say("call_waiting")))
         answer = self._services.goal_response(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._results.begin(goal)
+        if answer.outcome == "accepted":
+            self._begin_waypoints(goal)
         if cut.done() and answer.outcome == "unknown" and not goal.is_running:
             self._show_doubt(goal, answer.text)
         else:
@@ -513,10 +545,12 @@ class GoalTracker:
         return Outcome("rejected", say("cancel_refused", time=now))
 
     def on_feedback(self, action: str, sample: Sample) -> None:
-        """Processes the latest feedback of an action. Feedback of other programs' goals is ignored. The
+        """Processes the latest feedback of an action; that of other programs' goals is for tours. The
         caller refreshes the view with the next frame."""
         if self._robot.difference("AS", self._robot.key(action)):
             return
+        if self._waypoints is not None:
+            self._waypoints.on_feedback(action, sample)
         for goal in self._latest_goals(action):
             if self._robot.command_status[goal.widget.id].can_cancel:
                 topic = self._feedback_of(goal.widget)
@@ -551,17 +585,30 @@ class GoalTracker:
         return self._feedback[widget.id]
 
     def on_status(self, action: str, sample: Sample) -> None:
-        """Processes a status message of an action. Goals of other programs are ignored. The message is
-        kept for goals that are resumed later: the robot does not repeat it."""
+        """Processes a status message of an action; of other programs' goals it is for tours. The
+        message is kept for goals that are resumed later: the robot does not repeat it."""
         self._states[action] = sample
         goals = {goal.id.bytes: goal for goal in self._latest_goals(action)}
-        if not goals:
+        shown = self._waypoints is not None and self._waypoints.shows(action)
+        if not (goals or shown):
             return
         message = self._decode(names.status(self._robot.key(action)), STATUS_ARRAY, sample)
-        for status in () if message is None else message.status_list:
-            goal = goals.get(bytes(status.goal_info.goal_id.uuid))
-            if goal is not None and goal.advance(status.status):
+        statuses = () if message is None else message.status_list
+        states = {bytes(status.goal_info.goal_id.uuid): status.status for status in statuses}
+        for goal_id, state in states.items():
+            goal = goals.get(goal_id)
+            if goal is not None and goal.advance(state):
                 self._advanced(goal)
+        if shown and self._waypoints is not None:
+            self._waypoints.on_status(action, states)
+
+    def _begin_waypoints(self, goal: Goal) -> None:
+        if self._waypoints is not None:
+            self._waypoints.begin(goal.widget, goal.id.bytes, goal.sent)
+
+    def _is_own(self, goal_id: bytes) -> bool:
+        """Whether the panel sent a goal, as far as it is tracked."""
+        return any(goal_id == g.id.bytes for g in (*self._latest.values(), *self._results.goals))
 
     def _latest_goals(self, action: str) -> Iterator[Goal]:
         return (goal for goal in self._latest.values() if goal.widget.action == action)
@@ -587,6 +634,7 @@ class GoalTracker:
 
     def _confirm_running(self, goal: Goal) -> None:
         """The goal is running. Corrects the receipt if that was unknown."""
+        self._begin_waypoints(goal)
         if goal.doubt or not self._robot.command_status[goal.widget.id].busy:
             goal.doubt = ""
             answer = Outcome("accepted", say("goal_still_in_progress", time=format_time(time.time())))
@@ -612,6 +660,10 @@ class GoalTracker:
     def _finish(self, goal: Goal, answer: Outcome) -> None:
         """Shows a goal's result, or that it is unknown, and corrects the receipt."""
         goal.doubt = ""
+        if self._waypoints is not None:
+            self._waypoints.finish(
+                goal.widget.action, goal.id.bytes, goal.state or UNKNOWN, goal.missed
+            )
         self._show(goal, goal.end_status(answer))
         goal.correct(answer)
 
@@ -729,5 +781,14 @@ class GoalRecovery:
         own = goal_id(press.hash)
         self._log.info("press %s: tracking goal %s again: %s", press.press, own, doubt)
         self._actions.resume(
-            Goal(widget, press.press, own, cut, pending.correct, UNKNOWN, open_press.accepted, doubt)
+            Goal(
+                widget,
+                press.press,
+                own,
+                cut,
+                pending.correct,
+                UNKNOWN,
+                open_press.accepted,
+                doubt=doubt,
+            )
         )

@@ -20,7 +20,8 @@ from app.panel.places import Place
 from app.panel.widgets.map_layers import MapLayer
 from app.panel.widgets.map_levels import MapLevel
 from app.panel.widgets.map_view import MapView
-from app.panel.widgets.place import MapPose, PlaceInput, message_parts, read_pose
+from app.panel.widgets.place import MapInput, MapPose, PlaceInput, message_parts, read_pose
+from app.panel.widgets.tour import Tour, tour_parts
 from app.system.errors import InputError
 from app.system.texts import TextLike, ended, joined, number, say
 
@@ -55,6 +56,12 @@ class MapHere(NamedTuple):
     masks: tuple[tuple[MapLayer, MaskState], ...] = ()
 
 
+class MapFrame(NamedTuple):
+    """The frame of a map on which something may be sent."""
+
+    frame_id: str
+
+
 @dataclass(frozen=True, slots=True)
 class MapPoint:
     """A pose on the map with this version, in its frame."""
@@ -78,12 +85,26 @@ class Goal:
         return message_parts(*self.pose, self.frame, str(self.name))
 
 
-def map_of(widget: PlaceInput, robot: RobotState) -> MapView:
+@dataclass(frozen=True, slots=True)
+class TourGoal:
+    """The same of a tour: its poses in their order."""
+
+    stops: tuple[Goal, ...]
+    frame: str
+    name: TextLike
+
+    @property
+    def parts(self) -> dict[str, Any]:
+        """What messages name of it."""
+        return tour_parts([stop.parts for stop in self.stops], self.frame, str(self.name))
+
+
+def map_of(widget: MapInput, robot: RobotState) -> MapView:
     """The map that the input is of."""
     return robot.map_views[widget.map]
 
 
-def radius_of(widget: PlaceInput, robot: RobotState) -> float:
+def radius_of(widget: MapInput, robot: RobotState) -> float:
     """How much floor must be free around a goal, in metres."""
     return map_of(widget, robot).radius if widget.radius is None else widget.radius
 
@@ -105,7 +126,12 @@ def places_of(widget: PlaceInput, robot: RobotState) -> Iterator[Place]:
 def places_verdict(command: str, robot: RobotState, now: float) -> Verdict | None:
     """The lock of a command whose message has a place, while no place could be sent, or until when it
     may be; None for another command."""
-    verdicts = [input_verdict(widget, robot, now) for widget in robot.place_inputs.get(command, ())]
+    verdicts = [
+        tour_verdict(widget, robot, now)
+        if isinstance(widget, Tour)
+        else input_verdict(widget, robot, now)
+        for widget in robot.place_inputs.get(command, ())
+    ]
     return min(verdicts, key=lambda verdict: (verdict.permitted, verdict.until)) if verdicts else None
 
 
@@ -116,7 +142,7 @@ def map_versions(command: str, robot: RobotState, now: float) -> str:
 
 
 def input_verdict(
-    widget: PlaceInput, robot: RobotState, now: float, require_pose: bool | None = None
+    widget: MapInput, robot: RobotState, now: float, require_pose: bool | None = None
 ) -> Verdict:
     """The lock that does not depend on the choice: the map or, by default if the input requires it, the
     robot's pose is not known now."""
@@ -145,7 +171,7 @@ def _no_map(why: TextLike) -> TextLike:
     return joined((ended(why), say("place_no_map")))
 
 
-def map_here(widget: PlaceInput, robot: RobotState, now: float) -> MapHere:
+def map_here(widget: MapInput, robot: RobotState, now: float) -> MapHere:
     """The map of the level on which the robot is, if it is the robot's of now."""
     view = map_of(widget, robot)
     known = robot_level(view, robot, now)
@@ -158,7 +184,7 @@ def map_here(widget: PlaceInput, robot: RobotState, now: float) -> MapHere:
     return MapHere(known.level, grid, tuple(masks))
 
 
-def robot_pose(widget: PlaceInput, robot: RobotState, now: float) -> ShownPose:
+def robot_pose(widget: MapInput, robot: RobotState, now: float) -> ShownPose:
     """Where the robot is on the input's map; without a pose if that is not known."""
     grid = map_here(widget, robot, now).grid
     if not isinstance(grid, Grid):
@@ -177,7 +203,7 @@ def choice_of(widget: PlaceInput, value: Any, robot: RobotState, now: float) -> 
     raise InputError(say("place_gone", label=widget.label))
 
 
-def place_choice(widget: PlaceInput, place: Place, robot: RobotState, now: MapHere) -> Choice:
+def place_choice(widget: MapInput, place: Place, robot: RobotState, now: MapHere) -> Choice:
     """A place of the list, with why it may not be sent now."""
     here, grid, _ = now
     level = _level_of(widget, place, robot)
@@ -197,7 +223,7 @@ def place_choice(widget: PlaceInput, place: Place, robot: RobotState, now: MapHe
     return Choice(place, pose, place.map_version or "", level, is_elsewhere, refusal)
 
 
-def _level_of(widget: PlaceInput, place: Place, robot: RobotState) -> MapLevel | None:
+def _level_of(widget: MapInput, place: Place, robot: RobotState) -> MapLevel | None:
     """The level that a place says, or whose map now has its version; None if that is not known."""
     levels = map_of(widget, robot).maps
     if place.level is not None:
@@ -206,7 +232,7 @@ def _level_of(widget: PlaceInput, place: Place, robot: RobotState) -> MapLevel |
     return on[0] if len(on) == 1 else None
 
 
-def _levels_with(version: str, widget: PlaceInput, robot: RobotState) -> list[MapLevel]:
+def _levels_with(version: str, widget: MapInput, robot: RobotState) -> list[MapLevel]:
     """The levels whose map has this version."""
     states = ((level, robot.maps[robot.key(level.topic)]) for level in map_of(widget, robot).maps)
     return [level for level, state in states if state.grid and state.grid.version == version]
@@ -232,7 +258,7 @@ def _touched_choice(widget: PlaceInput, touched: MapPose, robot: RobotState, now
     return Choice(None, pose, touched.version, level, is_elsewhere, refusal)
 
 
-def _floor_refusal(widget: PlaceInput, pose: Pose, here: MapHere, robot: RobotState) -> TextLike:
+def _floor_refusal(widget: MapInput, pose: Pose, here: MapHere, robot: RobotState) -> TextLike:
     level, grid, masks = here
     assert level is not None
     assert isinstance(grid, Grid)
@@ -256,13 +282,56 @@ def goal_of(widget: PlaceInput, value: Any, robot: RobotState, now: float) -> Go
         return verdict.reason or ""
     if choice.refusal:
         return choice.refusal
+    frame = _frame_now(widget, robot, now)
+    return Goal(choice.pose, frame.frame_id, name_of(choice)) if isinstance(frame, MapFrame) else frame
+
+
+def tour_of(widget: Tour, value: Any, robot: RobotState, now: float) -> TourGoal | TextLike:
+    """The same of a tour."""
+    choices = tour_choices(widget, value, robot, now)
+    verdict = tour_verdict(widget, robot, now)
+    if not verdict.permitted:
+        return verdict.reason or ""
+    frame = _frame_now(widget, robot, now)
+    if not isinstance(frame, MapFrame):
+        return frame
+    goals = (Goal(each.pose, frame.frame_id, name_of(each)) for each in choices)
+    return TourGoal(tuple(goals), frame.frame_id, widget.label)
+
+
+def _frame_now(widget: MapInput, robot: RobotState, now: float) -> MapFrame | TextLike:
+    """The frame of the map of now, or why nothing may be sent on it."""
     here, grid, masks = map_here(widget, robot, now)
     topics = [here.topic, *(layer.topic for layer, _ in masks)] if here is not None else []
     if any(robot.maps[robot.key(topic)].is_behind for topic in topics):
         return say("place_map_behind")
-    if not isinstance(grid, Grid):
-        return _no_map(grid)
-    return Goal(choice.pose, grid.geometry.frame, name_of(choice))
+    return MapFrame(grid.geometry.frame) if isinstance(grid, Grid) else _no_map(grid)
+
+
+def tour_choices(widget: Tour, value: Any, robot: RobotState, now: float) -> list[Choice]:
+    """The places of a tour in their order; InputError for a value that is not the tour."""
+    widget.check_value(value)
+    known, here = {str(place.id): place for place in robot.places}, map_here(widget, robot, now)
+    if not known.keys() >= {*(widget.places or ())}:
+        raise InputError(say("place_gone", label=widget.label))
+    return [place_choice(widget, known[name], robot, here) for name in widget.places or ()]
+
+
+def tour_verdict(widget: Tour, robot: RobotState, now: float) -> Verdict:
+    """The lock of what sends a tour: that of an input, or a place that may not be sent now."""
+    verdict = input_verdict(widget, robot, now)
+    if not verdict.permitted:
+        return verdict
+    choices = tour_choices(widget, widget.default_value, robot, now)
+    for stop, choice in enumerate(choices, start=1):
+        if choice.refusal:
+            return Verdict(False, "tour_stop_refused", stop_refusal(stop, choice), verdict.until)
+    return verdict
+
+
+def stop_refusal(stop: int, choice: Choice) -> TextLike:
+    """Why a tour is not sent, by its place that may not be sent now."""
+    return say("tour_stop_refused", number=stop, place=name_of(choice), why=choice.refusal)
 
 
 def point_to_save(

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from app.cell.robot.alarmed import NO_ALARMED, AlarmAction, AlarmSelection
 from app.cell.robot.clocks import CLOCK, LARGEST_BYTES, RobotClock
@@ -37,7 +37,7 @@ from app.cell.robot.transforms import TransformTree
 from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.panel.places import Place
-from app.panel.used import places_by_command, selects_by_command
+from app.panel.used import actions_of_tours, places_by_command, selects_by_command
 from app.panel.widgets.parameter import GET
 from app.panel.widgets.robot_options import ListingService
 from app.records.entry import CommandStatuses
@@ -51,6 +51,9 @@ from app.ros.zenoh.sample import Sample as Sample
 from app.ros.zenoh.sample import SkippedPayload as SkippedPayload
 from app.system.log import RobotLog
 from app.system.texts import Text, TextLike
+
+if TYPE_CHECKING:
+    from app.cell.robot.waypoints import WaypointGoal
 
 log = logging.getLogger("kiosk.robot")
 
@@ -154,6 +157,8 @@ class RobotState:
         self.keep_out = KeepOut(panel.zones)
         self.saved_places: tuple[Place, ...] = ()  # by operators, beside those of the panel file
         self.place_inputs = places_by_command(panel)
+        self.tour_actions = actions_of_tours(panel)
+        self.waypoint_goals: dict[str, WaypointGoal] = {}  # the newest of each action that a tour shows
         self.history = History(time.monotonic(), time.time())
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:

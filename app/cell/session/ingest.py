@@ -102,7 +102,7 @@ class Ingest:
         self._clock_version = robot.clock.version
         judged = {topic for alarm in panel.alarms for topic in alarm.evaluated_topics}
         judged |= {topic for recipes in panel.recipes for topic in recipes.readback_topics}
-        views = [panel.map_views[widget.map] for widget in panel.place_inputs]
+        views = [panel.map_views[widget.map] for widget in panel.map_inputs]
         judged |= {topic for view in views for topic in view.deciding_topics}
         self._judged = frozenset(key for topic in judged for key in robot.possible_keys(topic))
         self._judged |= self._needed | self.immediate | self.lossless | self.recorded

@@ -547,7 +547,7 @@ def _map_listening(context: RobotContext) -> Callable[[str], None]:
     """Takes the key of a map or layer that was read: what it shows is shown, and what depends on a map
     with places is judged again."""
     robot, signals = context.robot, context.signals
-    views = (robot.map_views[each.map] for each in context.panel.place_inputs)
+    views = (robot.map_views[each.map] for each in context.panel.map_inputs)
     grids = ({level.topic for level in view.maps} | {m.topic for m in view.keep_out} for view in views)
     of_places = {robot.key(topic) for topics in grids for topic in topics}
 

@@ -57,6 +57,7 @@ from app.panel.widgets.sequence import Sequence as SequenceWidget
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.templated import is_stop
+from app.panel.widgets.tour import Tour
 from app.panel.widgets.trend import Trend
 from app.records.entry import IDLE, CommandStatus
 from app.system.texts import TextLike, joined, say
@@ -218,6 +219,12 @@ def _place_input(widget: PlaceInput, robot: RobotState, now: float) -> Attribute
     return place_input(widget, robot, now)
 
 
+def _tour(widget: Tour, robot: RobotState, now: float) -> AttributesUntil:
+    from app.cell.view.tour_values import tour
+
+    return tour(widget, robot, now)
+
+
 # Of widgets that send nothing.
 ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Static: _fixed,
@@ -238,6 +245,7 @@ ATTRIBUTES: Final[Mapping[type[BaseWidget], AttributesOf]] = {
     Joints: joints,
     MapView: _map_view,
     PlaceInput: _place_input,
+    Tour: _tour,
     Table: table,
     AlarmListView: lambda widget, robot, now: alarm_list(widget, robot),
     AlarmLineView: lambda widget, robot, now: alarm_line(widget, robot),

@@ -33,7 +33,7 @@ from app.panel.model import Panel
 from app.panel.needs import NO_NEEDS, PanelNeeds
 from app.panel.rules import STATE_ID
 from app.panel.widgets.families import Command, DisplayWidget
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput
 from app.records.press_record import Log
 from app.system.log import RobotLog
 from app.system.texts import TextLike, joined, say
@@ -351,7 +351,7 @@ class ViewRefresher:
 def _shown_keys(widget: DisplayWidget, panel: Panel, robot: RobotState) -> frozenset[str]:
     """The keys of the topics that a display shows, also of the conditions that it names."""
     topics = {source.topic for source in widget.sources()}
-    if isinstance(widget, PlaceInput):
+    if isinstance(widget, MapInput):
         view = panel.map_views[widget.map]
         sources = view.sources()
         topics |= {source.topic for source in sources if not source.place.startswith("layer")}

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from app.panel.base import TopicQos
 from app.panel.file.wording import no_such
 from app.panel.model import Panel
 from app.panel.places import MAX_ZONES, OnMapKeys, Place
@@ -9,7 +10,9 @@ from app.panel.robot_panels import widget_robots
 from app.panel.template import input_ids
 from app.panel.widgets.families import BaseWidget, Command, PressCommand
 from app.panel.widgets.map_layers import level_key_faults
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput, PlaceInput
+from app.panel.widgets.service_action import Action
+from app.panel.widgets.tour import Tour
 from app.system.errors import Fault
 from app.system.texts.text import alike
 
@@ -30,7 +33,7 @@ def place_faults(panel: Panel) -> Iterator[Fault]:
         for place_of, widget in page.placed():
             yield from _widget_faults(f"page[{p}].{place_of}", widget, panel)
     for r, table in enumerate(panel.recipes):
-        chosen = {widget.id for widget in panel.place_inputs}
+        chosen = {widget.id for widget in panel.map_inputs}
         for f, name in enumerate(table.fields):
             if name in chosen:
                 message = f'"{name}" is a place, of the moment: a recipe has other inputs'
@@ -58,7 +61,7 @@ def _needs_level(place: Place, panel: Panel) -> bool:
     return bool(views) and all(view.levels for view in views)
 
 
-def _offered_level_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Fault]:
+def _offered_level_faults(place: str, widget: MapInput, panel: Panel) -> Iterator[Fault]:
     """Faults of places that the input offers, and whose level its map does not have."""
     if (view := panel.map_views.get(widget.map)) is None:
         return
@@ -93,17 +96,19 @@ def _is_same(panel: Panel, first: int, second: int) -> bool:
 
 
 def _widget_faults(place: str, widget: BaseWidget, panel: Panel) -> Iterator[Fault]:
-    if isinstance(widget, PlaceInput):
+    if isinstance(widget, MapInput):
         yield from _input_faults(place, widget, panel)
+        if isinstance(widget, Tour):
+            yield from _tour_faults(place, widget, panel)
     elif isinstance(widget, Command) and not isinstance(widget, PressCommand):
-        chosen = {each.id for each in panel.place_inputs}
+        chosen = {each.id for each in panel.map_inputs}
         for name in input_ids(widget):
             if name in chosen:
                 message = f'sends the place "{name}" again and again: only a press may send one'
                 yield Fault(place, message, cause=f"input {name}")
 
 
-def _input_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Fault]:
+def _input_faults(place: str, widget: MapInput, panel: Panel) -> Iterator[Fault]:
     if widget.map not in panel.map_views:
         message = no_such("map", widget.map, panel.map_views)
         if not panel.map_views:
@@ -120,8 +125,29 @@ def _input_faults(place: str, widget: PlaceInput, panel: Panel) -> Iterator[Faul
         if name not in known:
             yield Fault(f"{place}.places[{n}]", no_such("place", name, known), cause=f"place {name}")
     yield from _offered_level_faults(place, widget, panel)
+    if not isinstance(widget, PlaceInput):
+        return
     if widget.needs and not widget.save:
         yield Fault(f"{place}.needs", "is for saving places: add save = true", cause="save")
     if not known and not widget.touch and not widget.save:
         message = "has nothing to choose: write [[place]] tables, or touch = true or save = true"
         yield Fault(f"{place}.touch", message, cause="place")
+
+
+def _tour_faults(place: str, widget: Tour, panel: Panel) -> Iterator[Fault]:
+    """Faults of the actions whose goals a tour shows, and of commands that send one without places."""
+    actions = {str(each.id): each for each in panel.commands if isinstance(each, Action)}
+    sent_by = [each for each in actions.values() if widget.id in input_ids(each)]
+    if widget.action is not None and widget.action not in actions:
+        message = no_such("action", widget.action, actions)
+        if not actions:
+            message = 'is the id of an action, and the panel has none: add one with kind = "action"'
+        yield Fault(f"{place}.action", message, cause=f"action {widget.action}")
+    elif widget.action is None and not sent_by:
+        message = "is missing: the id of the action whose goals it shows, or an action that sends"
+        yield Fault(f"{place}.action", f'{message} "{{{widget.id}.poses}}"', cause="tour")
+    if widget.places is None and any(widget.id in input_ids(each) for each in panel.commands):
+        message = "is missing: the ids of the places that it sends, in their order"
+        yield Fault(f"{place}.places", message, cause="tour")
+    if widget.qos != TopicQos() and widget.topic is None:
+        yield Fault(f"{place}.qos", "is of topic, which is missing")

@@ -13,7 +13,7 @@ from app.panel.times import TIME_FORMATS
 from app.panel.widgets.families import CheckContext, Command
 from app.panel.widgets.inputs import SelectInput
 from app.panel.widgets.map_view import MapView
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput
 from app.ros.dialects.dialect import WITH_OWN_DOMAIN
 from app.ros.messages import Interfaces
 from app.ros.messages.validation import format_value
@@ -85,7 +85,7 @@ def choice_faults(panel: Panel) -> Iterator[Fault]:
         for widget in panel.widgets()
         if widget.id in robots
         and (
-            isinstance(widget, PlaceInput)
+            isinstance(widget, MapInput)
             or (isinstance(widget, SelectInput) and widget.options_from is not None)
         )
     }

@@ -10,7 +10,8 @@ from app.panel.widgets.families import CheckContext, Input
 from app.ros.messages import Interfaces
 from app.system.errors import Fault, FieldError, InterfaceError
 
-GEOMETRY: Final = frozenset({"x", "y", "yaw", "orientation", "pose"})  # parts of a place, on its map
+# Parts of a place and of a tour, on their map.
+GEOMETRY: Final = frozenset({"x", "y", "yaw", "orientation", "pose", "poses"})
 NOW_RULE: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
 ON_OTHER_PAGE: Final = " on this page: an input is read from the page it is on"
 

@@ -237,11 +237,12 @@ def widget_path(path: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class TableKeys:
-    """The missing and unknown keys of one table."""
+    """The missing and unknown keys of one table. `around` is the table of the widget that it is in."""
 
     path: Path
     model: Model
     table: Mapping[str, Any]
+    around: Mapping[str, Any] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
@@ -347,24 +348,40 @@ def _misspelt_keys(table: TableKeys, follow: Consequences) -> Iterator[Fault]:
 
 def _missing_header(table: TableKeys, follow: Consequences) -> list[Fault]:
     """A fault of keys of another table whose header is missing."""
-    keys = set(table.unknown)
-    names = [name for name, model in _other_tables(table) if keys <= set(known_keys(model))]
-    if len(keys) < 2 or not names:
+    moved = _moved_keys(table)
+    names = [name for name, model in _other_tables(table) if {*moved} <= set(known_keys(model))]
+    if len(moved) < 2 or not names:
         return []
-    fault = table.fault(
-        table.unknown[0], f"{_quote_names(table.unknown)} are keys of {names[0]}: {ITS_HEADER}"
-    )
+    fault = table.fault(moved[0], f"{_quote_names(moved)} are keys of {names[0]}: {ITS_HEADER}")
     around = widget_path(table.path) or table.path[:WHOLE_PAGE]
     follow += [(place_of(around), fault)] if table.path else []
     return [fault]
 
 
+def _moved_keys(table: TableKeys) -> list[str]:
+    """The unknown keys, and with them the topic of another type than those of the table: below their
+    own header all of them would be good."""
+    about = table.model.model_fields.get("type")
+    types = get_args(about.annotation) if about is not None else ()
+    is_other = bool(table.unknown and types) and table.table.get("type") not in (None, *types)
+    if not is_other or not all(isinstance(each, str) for each in types):
+        return table.unknown
+    return [key for key in table.table if key in table.unknown or key in ("topic", "type")]
+
+
 def _other_tables(table: TableKeys) -> Iterator[tuple[str, Model]]:
-    """(name, description) of the tables in this one, then of all others of the file."""
+    """(name, description) of the tables that may be in this one, in its widget, then of all others of
+    the file."""
     header = ".".join(step for step in table.path if isinstance(step, str))
     for key in known_keys(table.model):
-        if model := inner_model(table.model, key):
+        if key not in table.table and (model := inner_model(table.model, key)):
             yield (f"{header}.{key}" if header else key), model
+    around = KINDS.get(str(table.around.get("kind")))
+    beside = known_keys(around.model) if around is not None and table.around is not table.table else ()
+    header = ".".join(step for step in widget_path(table.path) if isinstance(step, str))
+    for key in sorted(beside, key=lambda key: key in table.around):
+        if around is not None and (model := inner_model(around.model, key)):
+            yield f"{header}.{key}", model
     for kind in KINDS.values():
         if table.path[-2:-1] != ("widget",):
             yield "[[page.widget]]", kind.model

@@ -84,7 +84,10 @@ def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> Shap
         match detail["type"]:
             case "missing" | "extra_forbidden" as kind:
                 model, above = _resolve_location(detail["loc"][:-1])
-                table = keys.setdefault(above, TableKeys(above, model, _table_at(tables, above)))
+                widget = _table_at(tables, widget_path(above)) if widget_path(above) else {}
+                table = keys.setdefault(
+                    above, TableKeys(above, model, _table_at(tables, above), widget)
+                )
                 (table.missing if kind == "missing" else table.unknown).append(str(path[-1]))
             case "union_tag_not_found" | "union_tag_invalid":
                 faults.append(_kind_fault(path, detail["input"]))

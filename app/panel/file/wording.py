@@ -21,7 +21,7 @@ PATTERNS: Final[Mapping[str, str]] = {
     **dict.fromkeys(
         ("id", "robot", "needs", "groups", "interlock", "page", "fields", "condition", "places"), NO_ID
     ),
-    **dict.fromkeys(("map", "level", "alarms", "ack_command", "ack_input"), NO_ID),
+    **dict.fromkeys(("map", "level", "alarms", "action", "ack_command", "ack_input"), NO_ID),
     **dict.fromkeys(("logo", "src", "picture"), _PICTURE),
     **dict.fromkeys(("password_env", "secret_env"), _VARIABLE),
     **dict.fromkeys(("user_claim", "groups_claim"), _CLAIM),

@@ -37,6 +37,7 @@ from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.table import Table
 from app.panel.widgets.tiles import Tile
+from app.panel.widgets.tour import Tour
 from app.panel.widgets.trend import Trend
 from app.system.errors import KindError
 
@@ -86,6 +87,7 @@ KINDS: Final[Mapping[str, WidgetKind]] = {
     "camera": WidgetKind(Camera, tiles.CAMERA, styles=("own",), script=True),
     "map": WidgetKind(MapView, tiles.MAP, styles=("own",), script=True),
     "place": WidgetKind(PlaceInput, tiles.PLACE, styles=("entries", "own"), script=True),
+    "tour": WidgetKind(Tour, tiles.TOUR, styles=("own",), script=True),
     "log": WidgetKind(LogView, tiles.LOG, styles=("own",), script=True),
     "trend": WidgetKind(Trend, tiles.TREND, styles=("own",), script=True),
     "alarm_list": WidgetKind(

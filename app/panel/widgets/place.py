@@ -50,28 +50,34 @@ def message_parts(x: float, y: float, yaw: float, frame: str, label: str) -> dic
     return dict(zip(PARTS, values, strict=True))
 
 
-class PlaceInput(NeedsKey, DisplayWidget, Input):
-    """A place of the panel file or, with `touch`, a pose that is touched on the map with this id. With
-    `save` operators save places of their own; `needs` is what that needs beside its role. `radius`
-    (metres) is how much floor must be free around it, by default the map's. Without `require_pose` it
-    may be chosen while it is not known where the robot is."""
+class MapInput(DisplayWidget, Input):
+    """An input whose value is on the map with this id. `radius` (metres) is how much floor must be free
+    around each pose, by default the map's. Without `require_pose` it may be sent while it is not known
+    where the robot is."""
 
-    parts: ClassVar[tuple[str, ...]] = PARTS
-
-    kind: Literal["place"]
     map: Id
-    touch: bool = False
-    save: bool = False
-    places: Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(distinct)] | None = None
+    places: Annotated[tuple[Id, ...], Field(strict=False)] | None = None
     radius: Annotated[float, Field(gt=0, le=10)] | None = None
     require_pose: bool = True
-    question: SaidLabel = catalogue_default("place_question")
-    span: Span = 4
-    rows: Rows = 4
 
     def sources(self) -> Iterator[TopicSource]:
         """None: its map listens to them."""
         yield from ()
+
+
+class PlaceInput(NeedsKey, MapInput):
+    """A place of the panel file or, with `touch`, a pose that is touched on the map. With `save`
+    operators save places of their own; `needs` is what that needs beside its role."""
+
+    parts: ClassVar[tuple[str, ...]] = PARTS
+
+    kind: Literal["place"]
+    touch: bool = False
+    save: bool = False
+    places: Annotated[tuple[Id, ...], Field(strict=False), AfterValidator(distinct)] | None = None
+    question: SaidLabel = catalogue_default("place_question")
+    span: Span = 4
+    rows: Rows = 4
 
     @property
     def value_description(self) -> str:

@@ -36,6 +36,8 @@ FIGURE_HEIGHTS: Final = (
 FIGURE_WIDTH: Final = 190.0
 PLACE_WIDTH: Final = 190.0
 PLACE_MM: Final = 14.0  # of a place in a list, which scrolls
+TOUR_ROW: Final = 36.0
+TOUR_FRAME: Final = 50.0  # the line that says how far it is
 MAP_WIDTH: Final = 320.0  # its four keys
 PLAN_HEIGHT, LOW_PLAN_HEIGHT, PLAN_WIDTH = 144.0, 66.0, 100.0
 CONDITIONS_FRAME: Final = 33.0  # the line that says how many are met
@@ -239,6 +241,11 @@ MAP: Final = Tile(
 )
 PLACE: Final = Tile(
     lambda widget, screen: LABEL_HEIGHT + (2 + widget.save) * screen.touch(PLACE_MM),
+    lambda widget, screen: PLACE_WIDTH,
+    grows=True,
+)
+TOUR: Final = Tile(
+    lambda widget, screen: LABEL_HEIGHT + TOUR_FRAME + 2 * TOUR_ROW,
     lambda widget, screen: PLACE_WIDTH,
     grows=True,
 )

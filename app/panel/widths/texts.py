@@ -30,7 +30,7 @@ from app.panel.widgets.kinds import find_row
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.numbers import Numeric, SliderInput
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput
 from app.panel.widgets.publish import Step
 from app.panel.widgets.sequence import Sequence as SequenceWidget
 from app.panel.widgets.service_action import Action
@@ -306,7 +306,7 @@ TEXTS: Final[Mapping[type[BaseWidget], Texts]] = {
     LogView: _nothing,
     MapView: _nothing,
     Pallet: _pallet,
-    PlaceInput: _label,
+    MapInput: _label,
     Parameter: _parameter,
     PageLink: _link,
     TextLabel: _text_label,

@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 from app.panel.roles import ROLES
 from app.panel.widgets.families import Command, Input, PressCommand
 from app.panel.widgets.kinds import KINDS
+from app.panel.widgets.service_action import Action
 from app.system.texts import TextLike, say
 
 Tables = Mapping[str, Any]
@@ -381,6 +382,8 @@ REFERENCES: Final[Mapping[str, Names]] = {
     "link.page": _listed("page"),
     "map": _maps,
     "place_widget.places": _listed("place"),
+    "tour.places": _listed("place"),
+    "tour.action": _widgets_of(Action),
     "sequence.alarms": _listed("alarm"),
     "recipe.fields": _widgets_of(Input),
     "alarm.ack_command": _widgets_of(PressCommand),

@@ -1219,7 +1219,7 @@ class _Maker:
     def _inputs(self) -> Mapping[str, str]:
         inputs = {}
         for _, table in widgets(self.tables):
-            if table.get("kind") in ("text", "number", "slider", "select", "toggle", "place"):
+            if table.get("kind") in ("text", "number", "slider", "select", "toggle", "place", "tour"):
                 inputs[f"{{{table.get('id')}}}"] = plain(table.get("label"), self.language)
         return inputs
 

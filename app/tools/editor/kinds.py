@@ -47,6 +47,7 @@ FAMILIES: Final[Mapping[str, Sequence[Kind]]] = {
         Kind("select", say("editor_kind_select"), "list"),
         Kind("toggle", say("editor_kind_toggle"), "toggle-left"),
         Kind("place", say("editor_kind_place"), "map-pin"),
+        Kind("tour", say("editor_kind_tour"), "route"),
     ),
     "act": (
         Kind("publish", say("editor_kind_publish"), "radio"),

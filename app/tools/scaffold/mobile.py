@@ -38,6 +38,13 @@ ACTIONS: Final[Mapping[str, str]] = {
 OF_NAV2: Final = "an action between Nav2's own servers: send goals to its navigator"
 NAVIGATE: Final = f"{NAV2}NavigateToPose"
 GOAL: Final = "goal"  # the input for a goal
+# The actions whose goals a tour shows, the first that the robot has.
+THROUGH_POSES: Final = (f"{NAV2}FollowWaypoints", f"{NAV2}NavigateThroughPoses")
+TOUR: Final = "waypoints"
+TOUR_COMMENT: Final = (
+    "The poses of a goal, and where the robot is on the way. To send one: places with the ids of"
+    ' [[place]] tables here, and goal = { poses = "{waypoints.poses}" } there.'
+)
 GOALS: Final[Mapping[str, Mapping[str, Any]]] = {
     f"{NAV2}NavigateToPose": {
         "goal": {
@@ -149,18 +156,30 @@ def on_map_page(entries: Iterable[DraftWidget]) -> Iterator[DraftWidget]:
         return
     for entry in entries:
         yield replace(entry, place=(MAP_PAGE,)) if is_of_map_page(entry) else entry
-    nodes = (entry for entry in entries if entry.keys.get("type") == NAVIGATE)
-    for navigator in nodes:
+    map_id = id_of(shown.name, ())
+    by_type = {str(entry.keys.get("type")): entry for entry in reversed(entries)}
+    if (navigator := by_type.get(NAVIGATE)) is not None:
         yield replace(
             navigator,
             kind="place",
             name=GOAL,
-            keys={"label": "Goal", "map": id_of(shown.name, ()), "touch": True},
+            keys={"label": "Goal", "map": map_id, "touch": True},
             comment="Places of [[place]] tables, or a pose that is touched on the map.",
             place=(MAP_PAGE,),
             is_input=True,
         )
-        return
+    follower = next((by_type[kind] for kind in THROUGH_POSES if kind in by_type), None)
+    if follower is not None:
+        action = id_of(follower.name, ())
+        yield replace(
+            follower,
+            kind="tour",
+            name=TOUR,
+            keys={"label": "Waypoints", "map": map_id, "action": action},
+            comment=TOUR_COMMENT,
+            place=(MAP_PAGE,),
+            is_input=True,
+        )
 
 
 def _without_input(entry: DraftWidget) -> DraftWidget:

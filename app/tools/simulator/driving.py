@@ -398,8 +398,15 @@ class RobotAction:
         status = self._states[goal_id]
         if status == EXECUTING:
             return None
-        error = {"error_code": task.code, "error_msg": task.message, "success": not task.code}
-        return status, {name: value for name, value in error.items() if name in self._known}
+        ended: Fields = {
+            "error_code": task.code,
+            "error_msg": task.message,
+            "success": not task.code,
+            "missed_waypoints": [
+                {"index": stop, "error_code": code} for stop, code in sorted(task.missed.items())
+            ],
+        }
+        return status, {name: value for name, value in ended.items() if name in self._known}
 
 
 def _duration(seconds: float) -> Fields:
@@ -425,6 +432,17 @@ class PlayedDriving(PlayedStory):
         self._now = Moment(0.0, 0)
         begin: Mapping[str, tuple[Callable[[Any], Task | None], Callable[[Task], Fields]]] = {
             NAVIGATE: (self._navigate, self._way),
+            "/navigate_through_poses": (
+                lambda goal: self._tour(goal, goes_on=False),
+                lambda task: {
+                    **self._way(task),
+                    "number_of_poses_remaining": task.stops - task.stop,
+                },
+            ),
+            "/follow_waypoints": (
+                lambda goal: self._tour(goal, goes_on=True),
+                lambda task: {"current_waypoint": min(task.stop, task.stops - 1)},
+            ),
             "/dock_robot": (self._dock, self._docking),
             "/undock_robot": (lambda _: self.robot.undock(), lambda _: {}),
         }
@@ -481,6 +499,13 @@ class PlayedDriving(PlayedStory):
         if goal.pose.header.frame_id.lstrip("/") != "map":
             return None
         return self.robot.navigate(_read_pose(goal.pose.pose))
+
+    def _tour(self, goal: Any, *, goes_on: bool) -> Task | None:
+        """Without poses, or with one in another frame, it is rejected."""
+        frames = {pose.header.frame_id.lstrip("/") for pose in goal.poses}
+        if frames != {"map"}:
+            return None
+        return self.robot.tour([_read_pose(pose.pose) for pose in goal.poses], goes_on=goes_on)
 
     def _dock(self, goal: Any) -> Task | None:
         return self.robot.dock(goal.dock_id, drives_there=goal.navigate_to_staging_pose)

@@ -31,7 +31,7 @@ from app.panel.widgets.kinds import find_row, require_rows
 from app.panel.widgets.map_layers import INFO_FIELDS, INFO_TYPE
 from app.panel.widgets.map_view import MapView
 from app.panel.widgets.parameter import Parameter, listed_parameter
-from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.place import MapInput
 from app.panel.widgets.publish import PublishPress, Step
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.sequence import Sequence
@@ -285,7 +285,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Table: None,
     LogView: None,
     MapView: _map,
-    PlaceInput: None,
+    MapInput: None,
     AlarmView: None,
     Camera: _camera,
     Trend: _trend,

@@ -121,6 +121,7 @@ class Leg(NamedTuple):
     speed: float | None = None  # that of the robot
     backwards: bool = False
     phase: int = 0  # of DockRobot's feedback
+    stop: int = 0  # the number of the pose of a tour to which it leads
 
 
 @dataclass(slots=True)
@@ -135,10 +136,18 @@ class Task:
     has_ended: bool = False
     recoveries: int = 0
     wait_s: float = 0.0  # at its end
+    stops: int = 0  # poses of a tour
+    goes_on: bool = False  # to the next pose where the way to one is blocked
+    missed: dict[int, int] = field(default_factory=dict)  # the poses that it gave up, with their codes
     length: float = field(init=False)
 
     def __post_init__(self) -> None:
         self.length = sum(length_of(leg.points) for leg in self.legs)
+
+    @property
+    def stop(self) -> int:
+        """The number of the pose of a tour to which it drives, from 0 on."""
+        return self.legs[0].stop if self.legs else self.stops
 
     def fail(self, code: int, message: str) -> None:
         self.code, self.message, self.has_ended = code, message, True
@@ -304,6 +313,35 @@ class MobileRobot:
             self._begin_trip(task)
         else:
             task.fail(NO_VALID_PATH, "no way leads there")
+        self._close_ended()
+        return task
+
+    def tour(self, goals: list[Pose], *, goes_on: bool) -> Task | None:
+        """Drives to poses one after the other, in place of another such task; None if it takes no goal
+        now. With `goes_on` a pose that it does not reach is missed, and the next one follows."""
+        if self.is_manual or (self.task is not None and self.task.docks):
+            return None
+        self._end_task(UNKNOWN_ERROR, "another goal came")
+        task = self.task = Task(self.t, deque([self._undocking()] if self.is_docked else []))
+        task.stops, task.goes_on = len(goals), goes_on
+        start = STAGING[:2] if self.is_docked else self.pose[:2]
+        for stop, goal in enumerate(goals):
+            refused = self._refused_goal(goal)
+            way = [] if refused else self.hall.way(start, goal[:2], RADIUS)
+            if way:
+                task.legs.append(Leg(way, goal.yaw, stop=stop))
+                start = goal[:2]
+                continue
+            code, message = refused or (NO_VALID_PATH, "no way leads there")
+            task.missed[stop] = code
+            if not goes_on:
+                task.fail(code, message)
+                break
+        task.length = sum(length_of(leg.points) for leg in task.legs)
+        if len(task.missed) == len(goals) and not task.has_ended:
+            task.fail(NO_VALID_PATH, "no way leads there")
+        if not task.has_ended:
+            self._begin_trip(task)
         self._close_ended()
         return task
 
@@ -501,8 +539,23 @@ class MobileRobot:
             self._recovered_at = self.t
             task.recoveries += 1
         if self.t - self._blocked_since >= PATIENCE_S:
-            self._end_task(FOLLOW_NO_PROGRESS, "failed to make progress: the way is blocked")
+            if task.goes_on and task.stop + 1 < task.stops:
+                self._miss(task)
+            else:
+                task.missed[task.stop] = FOLLOW_NO_PROGRESS
+                self._end_task(FOLLOW_NO_PROGRESS, "failed to make progress: the way is blocked")
         return True
+
+    def _miss(self, task: Task) -> None:
+        """Gives up a pose of a tour, and drives to the next one from where it stands."""
+        given_up = task.legs.popleft()
+        task.missed[given_up.stop] = FOLLOW_NO_PROGRESS
+        self._note(f"waypoint {given_up.stop + 1} missed ({FOLLOW_NO_PROGRESS})", LOG_WARN)
+        following = task.legs.popleft()
+        end = following.points[-1]
+        way = self.hall.way(self.pose[:2], end, RADIUS) or [self.pose[:2], end]
+        task.legs.appendleft(following._replace(points=way))
+        self._gone, self._blocked_since = 0.0, None
 
     def _begin_trip(self, task: Task) -> None:
         self._gone = 0.0

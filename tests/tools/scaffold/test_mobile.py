@@ -72,6 +72,17 @@ def map_of(text: str) -> dict[str, Any]:
     return next(widget for widget in widgets(text).values() if widget["kind"] == "map")
 
 
+@pytest.mark.parametrize("kind", ["FollowWaypoints", "NavigateThroughPoses"])
+def test_a_tour_shows_the_goals_of_an_action_with_several_poses(kind: str, tmp_path: Path) -> None:
+    actions = (*ACTIONS, server("/follow", f"{NAV2}{kind}"))
+    path = tmp_path / "shuttle.toml"
+    path.write_text(text_of(controls=True, actions=actions))
+    (tour,) = check_panel(path).panel.tours
+    assert (tour.id, tour.map, tour.action, tour.places) == ("waypoints", "map", "follow", None)
+    assert "waypoints.poses" in path.read_text()
+    assert "tour" not in text_of(controls=True)
+
+
 @pytest.mark.parametrize("controls", [False, True])
 def test_page_of_the_map_comes_first_and_is_good(controls: bool, tmp_path: Path) -> None:
     path = tmp_path / "shuttle.toml"
@@ -149,8 +160,10 @@ def test_transforms_that_the_map_shows_are_not_said_to_be_left_out() -> None:
 
 
 def test_action_without_its_definition_is_a_remark() -> None:
-    waypoints = server("/follow_waypoints", f"{NAV2}FollowWaypoints")
-    assert "# - /follow_waypoints: " in text_of(actions=[waypoints])
+    route = server("/follow_waypoints", f"{NAV2}FollowWaypoints")
+    known = load_interfaces("jazzy")
+    draft = make_draft(Known(topics=TOPICS, actions=(route,)), known, Draft(title="Shuttle"), False, {})
+    assert "# - /follow_waypoints: " in toml_text(draft, controls=False)
 
 
 def test_map_page_stays_on_a_robot_with_many_namespaces() -> None:

@@ -118,6 +118,77 @@ def test_goal_is_reached_with_feedback(robot: Stepped) -> None:
     assert newest(robot, "/robot_place").data == "PALLETIZER_1"
 
 
+FOLLOW: Final = "/follow_waypoints"
+
+
+def tour(*names: str, frame: str = "map") -> Any:
+    poses = [goal(PLACES[name] if name in PLACES else Pose(-3.4, 9.0, 0.0), frame) for name in names]
+    return SimpleNamespace(poses=[each.pose for each in poses])
+
+
+def seen(robot: Stepped, action: str, field: str, seconds: int) -> list[int]:
+    """The values of a field of the feedback, each once, in their order."""
+    server, values = robot.robot.actions[action], []
+    types = robot.interfaces.action_types(server.type)
+    for _ in range(seconds):
+        robot.run(1)
+        for _, feedback in server.feedback():
+            robot.interfaces.encode(types.feedback, feedback)
+            values.append(feedback[field])
+    return list(dict.fromkeys(values))
+
+
+def test_tour_goes_from_pose_to_pose_with_feedback(robot: Stepped) -> None:
+    assert robot.robot.actions[FOLLOW].begin(GOAL_ID, tour("PALLETIZER_2", "PALLETIZER_1", "WRAPPER"))
+    assert seen(robot, FOLLOW, "current_waypoint", 80) == [0, 1, 2]
+    assert end(robot, FOLLOW) == (SUCCEEDED, {"error_code": 0, "missed_waypoints": []})
+
+
+def test_tour_misses_what_it_can_not_reach_and_goes_on(robot: Stepped) -> None:
+    server = robot.robot.actions[FOLLOW]
+    assert server.begin(GOAL_ID, tour("PALLETIZER_2", "in a wall", "PALLETIZER_1"))
+    assert seen(robot, FOLLOW, "current_waypoint", 60) == [0, 2]
+    missed = [{"index": 1, "error_code": GOAL_OCCUPIED}]
+    assert end(robot, FOLLOW) == (SUCCEEDED, {"error_code": 0, "missed_waypoints": missed})
+
+
+def put_box(robot: Stepped, *, there: bool) -> None:
+    """Something in the robot's way, or nothing."""
+    request = robot.interfaces.encode("std_srvs/srv/SetBool_Request", {"data": there})
+    robot.robot.serve("/obstacle", request)
+
+
+def test_tour_gives_up_a_pose_whose_way_is_blocked(robot: Stepped) -> None:
+    server = robot.robot.actions[FOLLOW]
+    put_box(robot, there=True)
+    assert server.begin(GOAL_ID, tour("PALLETIZER_2", "CHARGER"))
+    assert seen(robot, FOLLOW, "current_waypoint", 22) == [0, 1]
+    put_box(robot, there=False)
+    missed = [{"index": 0, "error_code": FOLLOW_NO_PROGRESS}]
+    assert end(robot, FOLLOW) == (SUCCEEDED, {"error_code": 0, "missed_waypoints": missed})
+
+
+@pytest.mark.parametrize("bad", [tour(), tour("WRAPPER", frame="odom")])
+def test_tour_without_poses_or_in_another_frame_is_rejected(robot: Stepped, bad: Any) -> None:
+    assert not robot.robot.actions[FOLLOW].begin(GOAL_ID, bad)
+
+
+def test_poses_that_remain_fall_and_a_pose_in_a_wall_aborts() -> None:
+    robot = MobileRobot()
+    task = robot.tour([PLACES["PALLETIZER_2"], PLACES["PALLETIZER_1"]], goes_on=False)
+    assert task is not None
+    left = []
+    for second in range(1, 60):
+        robot.step(float(second))
+        left.append(task.stops - task.stop)
+    assert list(dict.fromkeys(left)) == [2, 1, 0]
+    failed = robot.tour([PLACES["PALLETIZER_2"], Pose(-3.4, 9.0, 0.0)], goes_on=False)
+    assert failed is not None
+    assert (failed.code, failed.missed) == (GOAL_OCCUPIED, {1: GOAL_OCCUPIED})
+    robot.set_manual(on=True)
+    assert robot.tour([PLACES["WRAPPER"]], goes_on=True) is None
+
+
 def test_goal_in_another_frame_is_rejected(robot: Stepped) -> None:
     server = robot.robot.actions[NAVIGATE]
     assert not server.begin(GOAL_ID, goal(PLACES["WRAPPER"], "odom"))
