@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import pytest
 
+from app.ros.messages import load_interfaces
 from tests.bridge.test_goals_on_bridge import publish_map, publish_pose
 from tests.bridge.test_map_on_bridge import GRID, POSE, WITH_TOPIC
 from tests.support.cyclone import NAV2, Client, CycloneRobot, served
@@ -18,6 +19,7 @@ pytestmark = pytest.mark.promise("places")
 
 DRIVE: Final = "/navigate_to_pose"
 DOCK: Final = "/dock_robot"
+FOLLOW: Final = "/follow_waypoints"
 STAMPED: Final = 'header = { frame_id = "{goal.frame}", stamp = "{now}" }, pose = "{goal.pose}"'
 PANEL: Final = f"""
 title = "Shuttle"
@@ -28,6 +30,11 @@ label = "Bay"
 x = 1.25
 y = 0.75
 yaw = 1.5708
+[[place]]
+id = "gap"
+label = "Gap"
+x = 0.5
+y = -0.5
 [[page]]
 id = "main"
 title = "Main"
@@ -53,6 +60,20 @@ progress = "distance_remaining"
 progress_falls = true
 feedback = "{{distance_remaining:.1f}} m left"
 [[page.widget]]
+id = "round"
+kind = "tour"
+label = "Round"
+map = "hall"
+places = ["bay", "gap", "bay"]
+topic = "/waypoints"
+[[page.widget]]
+id = "follow"
+kind = "action"
+label = "Follow"
+action = "{FOLLOW}"
+type = "nav2_msgs/action/FollowWaypoints"
+goal = {{ poses = "{{round.poses}}" }}
+[[page.widget]]
 id = "dock"
 kind = "action"
 label = "Dock"
@@ -76,23 +97,29 @@ def nav2(
 
 
 @pytest.fixture
-def kiosk(own_cyclone_bridge: Bridge, nav2: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
-    """The panel, with a robot that is on the map and offers both actions."""
+def localization(own_cyclone_bridge: Bridge) -> Iterator[RosNode]:
     node = RosNode(own_cyclone_bridge.domain, "localization")
-    try:
-        node.advertise("/map", GRID, durability="transient_local", depth=1)
-        node.advertise("/pose", POSE)
-        publish_map(node)
-        with live_server(own_cyclone_bridge, tmp_path, PANEL) as server:
+    node.advertise("/map", GRID, durability="transient_local", depth=1)
+    node.advertise("/pose", POSE)
+    node.advertise("/waypoints", "nav_msgs/msg/Path")
+    publish_map(node)
+    yield node
+    node.end()
 
-            def is_permitted() -> bool:
-                publish_pose(node)
-                return bool(server.widget("send")["enabled"] and server.widget("dock")["enabled"])
 
-            until(is_permitted, "the robot is on the map and offers its actions")
-            yield server
-    finally:
-        node.end()
+@pytest.fixture
+def kiosk(
+    own_cyclone_bridge: Bridge, nav2: CycloneRobot, localization: RosNode, tmp_path: Path
+) -> Iterator[Server]:
+    """The panel, with a robot that is on the map and offers its actions."""
+    with live_server(own_cyclone_bridge, tmp_path, PANEL) as server:
+
+        def is_permitted() -> bool:
+            publish_pose(localization)
+            return all(server.widget(name)["enabled"] for name in ("send", "dock", "follow"))
+
+        until(is_permitted, "the robot is on the map and offers its actions")
+        yield server
 
 
 def press(kiosk: Server, widget: str, **inputs: str) -> Any:
@@ -161,3 +188,55 @@ def test_the_robot_docks(kiosk: Server, nav2: CycloneRobot) -> None:
     (sent,) = nav2.requests(f"{DOCK}/_action/send_goal")
     assert (sent["use_dock_id"], sent["navigate_to_staging_pose"]) == (True, True)  # Nav2's defaults
     assert sent["max_staging_time"] == 1000.0
+
+
+def states(kiosk: Server) -> list[str]:
+    return [row["state"] for row in kiosk.widget("round")["rows"]]
+
+
+def test_a_tour_is_followed_and_a_missed_pose_is_named(kiosk: Server, nav2: CycloneRobot) -> None:
+    assert states(kiosk) == ["planned"] * 3
+    nav2.step_nav2(name=FOLLOW, step_s=0.5)
+    press(kiosk, "follow")
+    until(
+        lambda: states(kiosk) == ["passed", "current", "to_come"], "the second pose is the current one"
+    )
+    assert kiosk.widget("round")["title"] == "Waypoint 2 of 3."
+    result = ended(kiosk, "follow", "succeeded")
+    assert "1 missed: waypoints 2." in result
+    until(lambda: states(kiosk) == ["reached", "missed", "reached"], "the list is marked")
+    assert "The way is blocked (105)." in kiosk.widget("round")["rows"][1]["note"]
+    (goal,) = nav2.goals_of_nav2(name=FOLLOW)
+    assert [pose["header"]["frame_id"] for pose in goal["poses"]] == ["map"] * 3
+    assert [pose["pose"]["position"]["y"] for pose in goal["poses"]] == [0.75, -0.5, 0.75]
+
+
+def test_a_canceled_tour_marks_what_was_not_driven_to(kiosk: Server, nav2: CycloneRobot) -> None:
+    nav2.step_nav2(name=FOLLOW, step_s=0.3)
+    press(kiosk, "follow")
+    until(lambda: "passed" in states(kiosk), "it is under way")
+    assert kiosk.http.post("/widgets/follow/cancel", json={}).json()["outcome"] == "accepted"
+    ended(kiosk, "follow", "canceled")
+    until(lambda: states(kiosk)[-1] == "left", "the list is marked")
+    assert kiosk.widget("round")["title"].startswith("Canceled.")
+
+
+def test_a_goal_of_another_program_is_shown(
+    kiosk: Server, nav2: CycloneRobot, own_client: Client, localization: RosNode
+) -> None:
+    nav2.step_nav2(name=FOLLOW, step_s=0.5)
+    types = load_interfaces("jazzy", (NAV2,))
+    poses = [
+        {"header": {"frame_id": "map"}, "pose": {"position": {"x": x}}} for x in (0.0, 1.0, 2.0, 2.5)
+    ]
+    goal = {"goal_id": {"uuid": [7] * 16}, "goal": {"poses": poses}}
+    send_goal = types.action_types("nav2_msgs/action/FollowWaypoints").send_goal_request
+    (reply,) = own_client.get("follow_waypoints/_action/send_goal", types.encode(send_goal, goal))
+    assert reply.ok is not None
+    title = "Sent by another program. Waypoint 2."
+    until(lambda: kiosk.widget("round")["title"] == title, "its feedback is shown")
+    assert kiosk.widget("round")["rows"] == []
+    localization.publish("/waypoints", {"header": {"frame_id": "map"}, "poses": poses})
+    until(lambda: states(kiosk)[:1] == ["passed"], "its list is shown")
+    assert len(states(kiosk)) == 4
+    until(lambda: states(kiosk) == ["planned"] * 3, "it has ended")

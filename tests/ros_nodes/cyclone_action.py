@@ -12,6 +12,7 @@ from cyclone_node import Answer, Node, qos_of
 from cyclone_types import (
     DOCK_ROBOT,
     FIBONACCI,
+    FOLLOW_WAYPOINTS,
     NAVIGATE_TO_POSE,
     UUID,
     ActionTypes,
@@ -22,6 +23,7 @@ from cyclone_types import (
     GoalStatus,
     GoalStatusArray,
     Header,
+    MissedWaypoint,
     Point,
     Pose,
     PoseStamped,
@@ -133,10 +135,38 @@ class Docking:
         return {"dock_id": self.request.dock_id, "state": self.state}
 
 
+class Following:
+    """A tour: one pose after the other. It misses those with a y below 0."""
+
+    def __init__(self, request: Any) -> None:
+        self.poses, self.current = request.poses, -1
+        self.is_valid = bool(self.poses)
+
+    @property
+    def is_done(self) -> bool:
+        return self.current + 1 >= len(self.poses)
+
+    def step(self) -> tuple[Any, ...]:
+        self.current += 1
+        return (self.current,)
+
+    def result(self, error: int) -> tuple[Any, ...]:
+        missed = [
+            MissedWaypoint(index, pose, 105)
+            for index, pose in enumerate(self.poses)
+            if pose.pose.position.y < 0
+        ]
+        return missed, error
+
+    def shown(self) -> dict[str, Any]:
+        return {"poses": [plain(pose) for pose in self.poses], "current": self.current}
+
+
 WORK: dict[str, type[Any]] = {
     FIBONACCI.name: FibonacciWork,
     NAVIGATE_TO_POSE.name: Drive,
     DOCK_ROBOT.name: Docking,
+    FOLLOW_WAYPOINTS.name: Following,
 }
 
 

@@ -19,6 +19,7 @@ from cyclone_parameters import Parameters
 from cyclone_types import (
     DOCK_ROBOT,
     FIBONACCI,
+    FOLLOW_WAYPOINTS,
     NAVIGATE_TO_POSE,
     AddTwoInts_Request,
     AddTwoInts_Response,
@@ -63,7 +64,11 @@ TOPIC_TYPES: dict[str, tuple[type, str]] = {
         "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
     ),
 }
-NAV2 = {"/navigate_to_pose": NAVIGATE_TO_POSE, "/dock_robot": DOCK_ROBOT}
+NAV2 = {
+    "/navigate_to_pose": NAVIGATE_TO_POSE,
+    "/dock_robot": DOCK_ROBOT,
+    "/follow_waypoints": FOLLOW_WAYPOINTS,
+}
 HEADER = ("guid", "sequence_number", "structure_needs_at_least_one_member")
 
 
@@ -115,7 +120,7 @@ class Commands:
         return self._fibonacci.end(CANCELED, goal)
 
     def serve_nav2(self, step_s: float) -> None:
-        """Offers /navigate_to_pose and /dock_robot, with the types of Nav2."""
+        """Offers /navigate_to_pose, /dock_robot and /follow_waypoints, with the types of Nav2."""
         for name, types in NAV2.items():
             self._nav2[name] = ActionServer(self._node, name, types)
             self._nav2[name].configure(step_s=step_s)

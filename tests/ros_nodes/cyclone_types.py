@@ -334,6 +334,22 @@ DOCK_ROBOT = action_types(
 )
 
 
+@dataclass
+class MissedWaypoint(IdlStruct, typename=dds_name("nav2_msgs/msg/MissedWaypoint")):
+    index: uint32
+    goal: PoseStamped
+    error_code: uint16
+
+
+FOLLOW_WAYPOINTS = action_types(
+    "nav2_msgs/action/FollowWaypoints",
+    {"number_of_loops": uint32, "goal_index": uint32, "poses": sequence[PoseStamped]},
+    {"missed_waypoints": sequence[MissedWaypoint], "error_code": uint16},
+    {"current_waypoint": uint32},
+    ([], 0),
+)
+
+
 # Parameters.
 
 

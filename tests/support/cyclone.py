@@ -103,7 +103,9 @@ TYPES = type_store()
 
 
 NAV2: Final = ROOT / "docs/examples/mobile-robot/interfaces"
-NAV2_ACTIONS: Final = ("nav2_msgs/action/NavigateToPose", "nav2_msgs/action/DockRobot")
+NAV2_ACTIONS: Final = tuple(
+    f"nav2_msgs/action/{name}" for name in ("NavigateToPose", "DockRobot", "FollowWaypoints")
+)
 PARTS_OF_ACTIONS: Final = (
     *("SendGoal_Request", "SendGoal_Response", "GetResult_Request", "GetResult_Response"),
     "FeedbackMessage",

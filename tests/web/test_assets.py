@@ -10,6 +10,7 @@ import pytest
 from app.panel.widgets.families import EntryWidget
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.publish import Step
+from app.panel.widgets.tour import Tour
 from app.system.errors import KindError
 from app.system.settings import shipped_path
 from app.web.assets import (
@@ -73,7 +74,7 @@ def test_stylesheet_has_the_rules_of_the_panels_widgets(
 
 def test_every_input_has_the_styles_of_entries() -> None:
     for name, kind in KINDS.items():
-        if issubclass(kind.model, EntryWidget) and not issubclass(kind.model, Step):
+        if issubclass(kind.model, EntryWidget) and not issubclass(kind.model, Step | Tour):
             assert "entries" in kind.styles, name
 
 

@@ -124,6 +124,8 @@ export class MapView {
     view.addEventListener("pointermove", (event) => this.#move(event));
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
       view.addEventListener(name, (event) => this.#up(/** @type {PointerEvent} */ (event).pointerId));
+    // Else Chromium takes a quick drag for a throw, and the next tap, on a button, only for the end of it.
+    view.addEventListener("touchmove", (event) => event.preventDefault(), { passive: false });
     view.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     view.addEventListener("keydown", (event) => this.#key(event));
     find(root, ".map-keys").addEventListener("click", ({ target }) => this.#do(closest(target, "button")?.dataset.do));
