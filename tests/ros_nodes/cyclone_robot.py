@@ -24,6 +24,7 @@ from cyclone_types import (
     AddTwoInts_Request,
     AddTwoInts_Response,
     Bool,
+    CostmapFilterInfo,
     GetTypeDescription_Request,
     GetTypeDescription_Response,
     Gripper,
@@ -58,6 +59,10 @@ TOPIC_TYPES: dict[str, tuple[type, str]] = {
     "map_msgs/msg/OccupancyGridUpdate": (
         OccupancyGridUpdate,
         "RIHS01_c4095b0be2e4363f8978a1570e0293ee093436f1e1c61d99b48502ac317025e8",
+    ),
+    "nav2_msgs/msg/CostmapFilterInfo": (
+        CostmapFilterInfo,
+        "RIHS01_61ce391bf7690f76a331c01c9d5ce8ca71e6c99273b9fb75e48380f05c6dfdc8",
     ),
     "std_msgs/msg/Bool": (
         Bool,
@@ -180,6 +185,11 @@ class Commands:
         header = Header(Time.at(time.time_ns()), "map")
         update = OccupancyGridUpdate(header, x, y, width, len(data) // width, data)
         self._node.published[topic].write(update)
+
+    def filter_info(self, topic: str, mask: str) -> None:
+        """Publishes that a mask is of a keepout filter."""
+        header = Header(Time.at(time.time_ns()), "map")
+        self._node.published[topic].write(CostmapFilterInfo(header, 0, mask, 0.0, 1.0))
 
     def transform(self, topic: str, parent: str, child: str, x: float, hz: float = 0.0) -> None:
         """Publishes where a frame is in another one: once, or so many times a second with the time of

@@ -163,6 +163,15 @@ class OccupancyGridUpdate(IdlStruct, typename=dds_name("map_msgs/msg/OccupancyGr
     data: sequence[int8]
 
 
+@dataclass
+class CostmapFilterInfo(IdlStruct, typename=dds_name("nav2_msgs/msg/CostmapFilterInfo")):
+    header: Header
+    type: uint8
+    filter_mask_topic: str
+    base: float32
+    multiplier: float32
+
+
 # ros_discovery_info: which readers and writers make up a node.
 
 
