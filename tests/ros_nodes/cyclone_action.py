@@ -153,7 +153,7 @@ class Following:
     def result(self, error: int) -> tuple[Any, ...]:
         missed = [
             MissedWaypoint(index, pose, 105)
-            for index, pose in enumerate(self.poses)
+            for index, pose in enumerate(self.poses[: self.current + 1])
             if pose.pose.position.y < 0
         ]
         return missed, error
