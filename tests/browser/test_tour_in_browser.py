@@ -105,8 +105,12 @@ def test_without_scripts_the_tour_is_a_list_and_is_sent(shuttle: Server, page: P
     assert names == ["Palletizer 2", "Palletizer 1", "Wrapper", "Gate 3"]
     assert place(widget(plain, "round").locator("ol"))["height"] > 100
     assert place(widget(plain, "hall_of_tour").locator(".map-view"))["height"] > 300
-    widget(plain, "drive_round").locator("button[type=submit]").first.click()
-    until(lambda: shuttle.widget("drive_round")["busy"], "it is sent")
+
+    def is_sent() -> bool:
+        widget(plain, "drive_round").locator("button[type=submit]").first.click()
+        return bool(shuttle.widget("drive_round")["busy"])
+
+    until(is_sent, "it is sent: not before the page is there for a while")
     assert shuttle.http.post("/widgets/drive_round/cancel", json={}).status_code == 200
     until(lambda: not shuttle.widget("drive_round")["busy"], "it is canceled")
     context.close()

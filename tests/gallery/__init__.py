@@ -28,6 +28,7 @@ from tests.gallery.displays import (
     READOUTS,
     SEQUENCES,
     TABLES,
+    TOURS,
     TRENDS,
 )
 from tests.gallery.examples import Part
@@ -54,6 +55,7 @@ PARTS: Final = (
     Part("Cameras", 3, CAMERAS),
     Part("Maps", 2, MAPS),
     Part("Places", 2, PLACES),
+    Part("Tours", 3, TOURS),
     Part("Logs", 2, LOGS),
     Part("Trends", 2, TRENDS),
     Part("Static", 5, STATIC),

@@ -7,6 +7,7 @@ from typing import Final, get_args
 
 from app.cell.robot.history import Column
 from app.cell.view.displays import LAMP_WORDS
+from app.cell.view.tour_values import STATE_WORDS
 from app.cell.view.trend import COLUMNS, Plot, draw
 from app.panel.widgets.displays import LEVELS as LOG_LEVELS
 from app.panel.widgets.displays import LampState
@@ -159,6 +160,51 @@ PLACES: Final = (
         PLACE,
         {"state": "missing", "note": say("place_pose_old", age=say("age_seconds", number=6))} | OFFERED,
     ),
+)
+TOUR: Final[Table] = {"label": texts.TOUR.table, "map": "hall", "places": ["charger", "gate"]}
+
+
+def _tour_rows(*states: str, why: TextLike = "") -> list[dict[str, object]]:
+    """A list of the two places in turn; `why` is said of what was missed."""
+    names = (texts.CHARGER.shown, texts.GATE.shown)
+    return [
+        {"number": n + 1, "label": names[n % 2], "state": state, "pose": None}
+        | {"word": say(STATE_WORDS[state]) if state in STATE_WORDS else number("4.2", "m")}
+        | {"note": why if state == "missed" else ""}
+        for n, state in enumerate(states)
+    ]
+
+
+BLOCKED: Final = say("nav2_blocked", error="105")
+TOURS: Final = tuple(
+    Example(name, "tour", TOUR, {"state": state, "note": note, "title": title, "rows": rows})
+    for name, state, note, title, rows in (
+        ("planned", "live", "", "", _tour_rows("planned", "planned")),
+        ("locked", "missing", say("place_pose_unknown"), "", _tour_rows("planned", "planned")),
+        (
+            "under way",
+            "live",
+            "",
+            say("tour_at", number=2, total=3),
+            _tour_rows("passed", "current", "to_come"),
+        ),
+        (
+            "old",
+            "old",
+            "",
+            say("tour_old", age=say("age_seconds", number=12)),
+            _tour_rows("passed", "current", "to_come"),
+        ),
+        (
+            "one missed",
+            "live",
+            "",
+            say("tour_missed_count", count=1, total=3),
+            _tour_rows("reached", "missed", "reached", why=BLOCKED),
+        ),
+        ("canceled", "live", "", say("tour_canceled"), _tour_rows("passed", "left", "left")),
+        ("of another program", "live", "", say("tour_other_program"), []),
+    )
 )
 LOG: Final[Table] = {"label": texts.ROBOT_LOG.table, "lines": 10}
 LOGS: Final = (
