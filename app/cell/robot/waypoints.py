@@ -63,7 +63,8 @@ class WaypointGoal:
 
     def finish(self, state: int, missed: Mapping[int, int], now: float) -> None:
         """It has ended in a state of action_msgs/msg/GoalStatus."""
-        self.end, self.ended_at, self.missed, self.way_m = state, now, missed, None
+        known = {index: error for index, error in missed.items() if index < self.total}
+        self.end, self.ended_at, self.missed, self.way_m = state, now, known, None
 
     @property
     def is_good(self) -> bool:

@@ -100,7 +100,7 @@ def test_a_way_that_is_no_number_is_not_shown(way: Any) -> None:
         (4, {}, ["reached"] * 4),
         (4, {1: 105}, ["reached", "missed", "reached", "reached"]),
         (5, {}, ["passed", "passed", "left", "left"]),
-        (6, {2: 208}, ["passed", "passed", "missed", "left"]),
+        (6, {2: 208, 9: 208}, ["passed", "passed", "missed", "left"]),
         (7, {}, ["passed", "passed", "left", "left"]),
     ],
 )
