@@ -37,6 +37,7 @@ SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280),
 ALL: Final = ROOT / "build/screenshots"
 IMAGES: Final = ROOT / "docs/images"
 CYCLE_MS: Final = 60_000  # a state of the demo robot comes within this time
+CURVE_S: Final = 70.0  # of the curve of an alarm
 LOADED_MS: Final = 200  # scripts and values are there
 RECEIPTS_S: Final = 12.0  # the cell has placed a box
 COLOURS: Final = 96
@@ -148,8 +149,8 @@ def take_for_readme(browser: Browser, url: str) -> None:
 
 
 def take_for_editor(browser: Browser) -> None:
-    """The editor with a changed label, with what a topic can be shown as, and with a line that another
-    program has changed too."""
+    """The editor with a changed label, with what a topic can be shown as, with an alarm's curve, and
+    with a line that another program has changed too."""
     with TemporaryDirectory() as folder:
         file = Path(copy(EXAMPLE, Path(folder) / "cell1.toml"))
         editor = EditorServer(file)
@@ -172,7 +173,10 @@ def take_for_editor(browser: Browser) -> None:
             expect(page.locator("#ask")).to_be_visible()
             page.wait_for_timeout(1000 * SETTLED_S)
             picture(page, "editor-pick.png")
-            page.keyboard.press("Escape")
+            page.locator(".ways button", has_text="Alarm").click()
+            expect(page.locator("#curve .limit-flag")).to_be_visible()
+            page.wait_for_timeout(1000 * CURVE_S)
+            picture(page, "editor-curve.png")
 
             file.write_text(file.read_text().replace('en = "Boxes"', 'en = "Cartons"', 1))
             expect(page.locator("#conflict")).to_be_visible(timeout=CYCLE_MS)

@@ -3,6 +3,7 @@
 Exit status: 0 it was ended, 1 it can't be started, 2 a mistake on the command line.
 """
 
+import logging
 import secrets
 import socket
 import sys
@@ -13,6 +14,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from ipaddress import ip_address
 from pathlib import Path
+from types import FrameType
 from typing import Final
 
 from app.system.errors import KioskError, SettingsError
@@ -31,6 +33,8 @@ LANGUAGES: Final = ("en", "ja", "de")
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
     options = parser.parse_args(arguments)
+    if options.panel is None:
+        parser.error(_no_file(prog))
     if (options.ssl_certfile is None) != (options.ssl_keyfile is None):
         parser.error("--ssl-certfile and --ssl-keyfile are given together")
     if find_spec(NEEDED) is None:
@@ -62,6 +66,16 @@ def _is_loopback(host: str) -> bool:
     return all(ip_address(str(info[4][0]).partition("%")[0]).is_loopback for info in infos)
 
 
+def _no_file(prog: str) -> str:
+    """What to type instead: the panel files of this folder, else a new one."""
+    from app.tools.editor.start import panels_in
+
+    names = [*panels_in(Path.cwd())]
+    if not names:
+        return f"the panel file is missing: `{prog} cell1.toml` begins one of this name"
+    return f"the panel file is missing: here is {', '.join(names)}; another name begins a new one"
+
+
 def _serve(options: Namespace, settings: Settings) -> int:
     """Serves until it is ended. Imported here: the help needs no server."""
     import uvicorn
@@ -86,7 +100,15 @@ def _serve(options: Namespace, settings: Settings) -> int:
     )
     scheme = "https" if options.ssl_certfile else "http"
     print(f"{scheme}://{name}:{port}/?token={token}", flush=True)
-    server = uvicorn.Server(
+    print("Open this address in a browser. Ctrl-C ends the editor.", file=sys.stderr)
+
+    class Server(uvicorn.Server):
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            # Streams that this cuts off are no errors.
+            logging.getLogger("uvicorn.error").disabled = True
+            super().handle_exit(sig, frame)
+
+    server = Server(
         uvicorn.Config(
             app,
             ssl_certfile=options.ssl_certfile,
@@ -108,7 +130,8 @@ def make_parser(prog: str) -> Parser:
         " it was written, with its comments.",
     )
     add = parser.add_argument
-    add("panel", metavar="PANEL", type=_panel, help="the panel file; one that is not there is begun")
+    about = "the panel file; one that is not there is begun"
+    add("panel", metavar="PANEL", type=_panel, nargs="?", help=about)
     add("--host", default="127.0.0.1", help="address to listen on; default: %(default)s")
     add("--port", default=8100, type=port_to_listen, help="default: %(default)s; 0: one that is free")
     add(

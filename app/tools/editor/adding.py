@@ -13,6 +13,7 @@ from app.system.texts import TextLike, render, say
 from app.tools.editor.document import Change, edit_from, path_from
 from app.tools.editor.editor import Editor, PartRequest
 from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, ICONS, NAMES, added, place_near
+from app.tools.editor.paths import EMPTY
 from app.tools.editor.paths import at as value_at
 from app.tools.editor.robot_list import SECTIONS, Row, Section
 from app.tools.editor.suggestions import Drop, Suggestion, drop_of, is_command
@@ -70,6 +71,27 @@ def parts_pane(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
         "families": families,
         "described": described,
         "words": {"search": say("editor_search_parts")},
+    }
+
+
+def empty_pane(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
+    """What can come at an empty place of a page: groups, or widgets."""
+    _, context = parts_pane(request)
+    in_page = request.path[-3] == "group"
+    families = FAMILIES.items()
+    shown = [
+        (FAMILY_NAMES[name], [kind for kind in kinds if (kind.table == "group") == in_page])
+        for name, kinds in families
+        if (name == "file") == in_page
+    ]
+    return "_empty.html", {
+        **context,
+        "families": shown,
+        "path": request.path,
+        "words": {
+            "empty": say("editor_empty_place"),
+            "fill": say("editor_fill_place"),
+        },
     }
 
 
@@ -134,6 +156,7 @@ def add(editor: Editor, addition: Addition, language: str) -> Change:
     """One step of the document; NotFound if the item or its choice is gone."""
     tables = editor.document.tables
     near = path_from(addition.near) if addition.near else ()
+    near = near[:-3] if near[-1:] == (EMPTY,) else near
     if addition.kind:
         if addition.kind not in NAMES:
             raise NotFound(f'there is no kind "{addition.kind:.64}"')
@@ -142,7 +165,8 @@ def add(editor: Editor, addition: Addition, language: str) -> Change:
         group = addition.kind == "group"
         at = path_from(addition.at) if addition.at and not group else None
         at = at or place_near(tables, near, addition.page, group=group)
-        drop = added(addition.kind, label, tables, at)
+        on = near if addition.kind == "interlock" and is_command(_table(editor, near)) else None
+        drop = added(addition.kind, label, tables, at, on)
     else:
         section, key = _item(addition.section, addition.key)
         known = editor.robots.suggestions(section, key, editor.preview.panel)

@@ -49,6 +49,7 @@ class Editor:
         self._checker = checker
         self._numbers = 0
         self._begun = ""  # the text of a new file
+        self._is_gone = False  # whether the file was removed
         preview.on_live = self.notify
 
     @property
@@ -86,15 +87,16 @@ class Editor:
         """EditError if nothing was taken back."""
         return self._changed(self.session.redo(author), 1)
 
-    def save(self, author: str = "") -> TextLike:
+    def save(self, author: str = "", *, recreate: bool = False) -> TextLike:
         """Saves, with the changes that others have made in the file, and returns what went wrong
-        beside that; SaveConflict if both have changed a table, SessionError if it can't be written."""
+        beside that. `recreate`: also if the file was removed. SaveConflict if both have changed a
+        table, SessionError if it can't be written."""
         revision = self.document.revision
         try:
-            saved = self.session.save(author=author)
+            saved = self.session.save(recreate=recreate, author=author)
         finally:
             self.notify()
-        self.changes = 0
+        self.changes, self._is_gone = 0, False
         if self.document.revision != revision:
             self.show()
         return saved.problem
@@ -117,6 +119,9 @@ class Editor:
         while True:
             await asyncio.sleep(WATCH_S)
             has_conflicts = bool(self.session.conflicts)
+            was_gone, self._is_gone = self._is_gone, self.session.disk_state == "gone"
+            if was_gone != self._is_gone:
+                self.notify()
             if self.session.disk_state != "changed" or has_conflicts:
                 continue
             revision = self.document.revision
@@ -179,6 +184,7 @@ class Editor:
             "redo": document.redo_label is not None,
             "faults": len(self.checked.faults),
             "conflicts": len(session.conflicts),
+            "gone": self._is_gone,
             "recovered": session.recovered is not None,
             "warning": session.journal_problem,
             "others": [

@@ -33,6 +33,8 @@ _PEOPLE: Final = SectionKeys(
 )
 _PLACE: Final = SectionKeys("form_section_place", ("span", "rows", "grow", "columns"))
 SECTIONS: Final[tuple[SectionKeys, ...]] = (_LABEL, _VALUE, _PEOPLE, _PLACE)
+# Of commands: their locks are what people look for first.
+SECTIONS_OF_COMMANDS: Final = (_LABEL, _VALUE, _PEOPLE._replace(title="form_section_lock"), _PLACE)
 SECTIONS_BY_TABLE: Final[Mapping[str, tuple[SectionKeys, ...]]] = {
     "alarm": (
         SectionKeys(
@@ -53,7 +55,7 @@ SECTIONS_BY_TABLE: Final[Mapping[str, tuple[SectionKeys, ...]]] = {
     "interlock": (
         SectionKeys("form_section_label", ("label", "locked", "action", "help")),
         _VALUE,
-        SectionKeys("form_section_people", ("robot", "needs")),
+        SectionKeys("form_locks", ("robot", "needs")),
     ),
     "condition": (SectionKeys("form_section_label", ("label", "action")), _VALUE),
     "panel": (
@@ -103,13 +105,14 @@ COMMON: Final = frozenset(
         *("map", "places", "layer", "rate_hz", "x_axis", "y_axis", "across", "along", "layers"),
         *("range", "values", "period_s", "open", "groups", "required", "days", "topics", "logo"),
         *("before_s", "after_s", "sound", "lamp", "words", "fault", "reliability", "durability"),
-        *("depth",),
+        *("depth", "demo_story", "stop_hint", "screen", "brand", "record", "success"),
+        *("progress", "fit", "overview", "publishers", "require_publisher", "keep", "idle_s"),
+        *("stale_s", "when"),
     }
 )  # fmt: skip
 
 # Keys that stand beside another in its row, by that key.
 BESIDE: Final[Mapping[str, str]] = {
-    "id": "kind",
     "unit": "format",
     "min": "max",
     "scale": "offset",
@@ -135,6 +138,14 @@ BESIDE_BY_TABLE: Final[Mapping[str, Mapping[str, str]]] = {
 # Of an alarm: what raises it in place of limits.
 RAISED_BY: Final = ("when", "list", "diagnostics", "node", "lost", "stale_s")
 LIMITS: Final = ("high_high", "high", "low", "low_low")
+# Of an alarm with limits: keys that say nothing where something else raises it.
+ONLY_WITH_LIMITS: Final = (
+    *LIMITS,
+    *("deadband", "critical_priority", "source", "topic", "type", "field", "unit", "format"),
+    *("scale", "offset", "max_age_s", "qos"),
+)
+# Texts that people write in several lines.
+LONG_TEXTS: Final = frozenset({"action", "cause", "consequence", "stop_hint", "locked"})
 
 # Tables with a form of their own, opened from a list; other tables are within the form that has them.
 OPENED: Final = frozenset(
@@ -206,6 +217,12 @@ NAMES: Final[Mapping[str, str]] = {
     "value": "form_key_value",
     "widget": "form_key_widget",
 }
+# The names of keys that say something else of a command.
+NAMES_OF_COMMANDS: Final[Mapping[str, str]] = {
+    "interlock": "form_key_locked_unless",
+    "needs": "form_key_pressed_by",
+    "consequence": "form_key_press_does",
+}
 # The words of tables with tabs and lists of their own.
 TABLE_NAMES: Final[Mapping[str, str]] = {
     "alarm": "form_table_alarm",
@@ -252,9 +269,17 @@ IN_THE_UNIT: Final = frozenset(
 )
 
 
-def key_name(key: str) -> TextLike:
-    """The name of a key in a form."""
+def key_name(key: str, table: str = "") -> TextLike:
+    """The name of a key in the form of a table."""
+    if is_command(table) and key in NAMES_OF_COMMANDS:
+        return say(NAMES_OF_COMMANDS[key])
     return say(NAMES[key]) if key in NAMES else _plain_name(key)
+
+
+def is_command(table: str) -> bool:
+    """Whether it is the table of a widget with which people act on the robot."""
+    kind = KINDS.get(table)
+    return kind is not None and issubclass(kind.model, Command)
 
 
 def table_name(table: str) -> TextLike:

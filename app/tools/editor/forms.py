@@ -14,7 +14,6 @@ from typing import Any, Final, Literal
 from app.panel.file.keys import place_of
 from app.panel.file.toml_lines import Path
 from app.panel.reference.schema import REF, ROOT, SAME, WIDGET, Schema, of_kind, panel_schema
-from app.panel.widgets.families import Command
 from app.panel.widgets.key_parts import COLOURS
 from app.panel.widgets.kinds import KINDS
 from app.ros.messages import Interfaces
@@ -30,13 +29,18 @@ from app.tools.editor.form_keys import (
     COMMON,
     IN_THE_UNIT,
     LIMITS,
+    LONG_TEXTS,
+    ONLY_WITH_LIMITS,
     OPENED,
     PRIORITIES,
     RAISED_BY,
+    REST,
     SECTIONS,
     SECTIONS_BY_TABLE,
+    SECTIONS_OF_COMMANDS,
     Named,
     Tables,
+    is_command,
     key_name,
     list_of,
     plain,
@@ -46,6 +50,7 @@ from app.tools.editor.form_keys import (
     unit_of,
     widgets,
 )
+from app.tools.editor.kinds import NAMES as KIND_NAMES
 
 Edit = Mapping[str, Any]  # as `POST /edits` takes it
 Edits = tuple[Edit, ...]
@@ -111,6 +116,7 @@ LINK: Final = re.compile(r"\[([^\]]*)\]\([^)]*\)")  # of Markdown
 # Texts that would be read as something else without quotes.
 PLAIN: Final = re.compile(r"""(true|false|[-+]?\.?[0-9].*|["'\[].*|\{[^=]*=.*|\{\s*\}|)""", re.DOTALL)
 TWELFTHS: Final = 12  # columns of a group that says nothing
+PEOPLE: Final = ("form_section_people", "form_section_lock")
 PARTS: Final = {4: "¼", 2: "½", 1: ""}  # of a row; the whole is said in words
 
 
@@ -176,6 +182,7 @@ class Act:
     icon: str
     edits: Edits
     then: str = ""  # the element that has the focus afterwards
+    opens: Path | None = None  # the table whose form comes afterwards
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +219,7 @@ class Field:
     by_edits: bool = False  # the value of a choice is a list of edits
     single: bool = False  # one ticked value is written without a list
     side_by_side: bool = False
+    tall: bool = False  # its texts have several lines
     faults: tuple[str, ...] = ()
     choices: tuple[Choice, ...] = ()
     texts: tuple[TextIn, ...] = ()
@@ -247,6 +255,11 @@ class Field:
     @property
     def is_set(self) -> bool:
         return self.raw is not None
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether it has a fault, or has to be filled in."""
+        return bool(self.faults) or (self.required and not self.is_set and not self.default)
 
 
 @dataclass(frozen=True, slots=True)
@@ -645,7 +658,7 @@ class _Maker:
             name,
             title_of(table, self.language) if path else plain(table.get("title"), self.language),
             self._note(path, name, table),
-            tuple(self._sections(name, table, fields, path)),
+            tuple(self._sections(name, table, fields, path, is_row=bool(acts))),
             faults=self._faults_at(path),
             acts=acts,
             help=str(known.get("description", "")),
@@ -653,13 +666,21 @@ class _Maker:
 
     def _note(self, path: Path, name: str, table: Mapping[str, Any]) -> TextLike:
         if "widget" in path[-2:]:
-            return plain(table.get("kind"))
+            kind = plain(table.get("kind"))
+            return KIND_NAMES.get(kind, kind)
         return table_name(name)
 
     def _sections(
-        self, name: str, table: Mapping[str, Any], fields: dict[str, Field], path: Path
+        self,
+        name: str,
+        table: Mapping[str, Any],
+        fields: dict[str, Field],
+        path: Path,
+        *,
+        is_row: bool,
     ) -> Iterator[FormSection]:
-        rules = SECTIONS_BY_TABLE.get(name, SECTIONS)
+        usual = SECTIONS_OF_COMMANDS if is_command(name) else SECTIONS
+        rules = SECTIONS_BY_TABLE.get(name, usual)
         placed = {key for rule in rules for key in rule.keys}
         begins: list[str] = [key for key in ("id", "kind", SAME) if key in fields]
         others = [key for key in fields if key not in placed and key not in begins]
@@ -669,7 +690,11 @@ class _Maker:
             yield FormSection("", tuple(_paired(head, fields, BESIDE)))
             begins = []
         folded: list[Field] = []
-        hidden = set(LIMITS) if name == "alarm" and _has_other_cause(table) else set()
+        hidden: set[str] = set()
+        if name == "alarm":
+            hidden = {key for key in _other_keys(table) if key not in table and not fields[key].faults}
+            if not any(key in table for key in LIMITS):  # what raises it comes first
+                rules = tuple(sorted(rules, key=lambda rule: rule.keys != REST))
         if any(key in table for key in ("topic", "service", "action")) and "type" in table:
             hidden |= set() if fields["type"].faults else {"type"}  # it stands beside the name
         for number, rule in enumerate(rules):
@@ -680,13 +705,17 @@ class _Maker:
             rows = [*_paired(shown, fields, BESIDE_BY_TABLE.get(name, BESIDE))]
             if rule.title == "form_section_place" and "widget" in path[-2:]:
                 rows = [*self._place(path), *rows]
-            if rule.title == "form_section_people" and (alarms := self._alarms(path, table)):
+            if rule in usual and rule.title in PEOPLE and (alarms := self._alarms(path, table)):
                 rows = [alarms, *rows]
+            if name == "interlock" and rule.title == "form_locks":
+                rows = [*self._locks(path, table), *rows]
             if rows:
                 note = self._live(table) if not rule.keys else self._languages_of(rows)
                 yield FormSection(say(rule.title), tuple(rows), note, rule.title)
         beside = {each.key for each in folded} & {*BESIDE_BY_TABLE.get(name, {}).values()}
         folded = [each for each in folded if each.key not in beside or name != "alarm" or hidden]
+        if len(path) > 1 and path[-2] != "widget" and not is_row and (order := self._order_of(path)):
+            yield FormSection("", (order,))
         if folded:
             title = say("form_more_keys", number=len(folded))
             yield FormSection(title, tuple(folded), folded=True)
@@ -739,13 +768,22 @@ class _Maker:
                 by_edits=True,
                 required=True,
             )
+        if order := self._order_of(path):
+            yield order
+
+    def _order_of(self, path: Path) -> Field | None:
+        """The buttons that move, copy and remove a table of a list; None for others."""
+        *above, index = path
+        listed = value_at(self.tables, tuple(above))
+        if not isinstance(index, int) or not isinstance(listed, list) or index >= len(listed):
+            return None
         acts = []
         for to, word, icon_name in (
             (index - 1, "form_move_up", "arrow-up"),
             (index + 1, "form_move_down", "arrow-down"),
         ):
             edits: Edits = ()
-            if 0 <= to < count:
+            if 0 <= to < len(listed):
                 edits = ({"op": "move", "path": [*path], "to": [*above, to]},)
             acts.append(Act(say(word), icon_name, edits))
         acts.append(
@@ -756,14 +794,33 @@ class _Maker:
             )
         )
         acts.append(Act(say("form_remove"), "x", ({"op": "delete", "path": [*path]},)))
-        yield Field(
-            path,
-            say("form_order"),
-            "opened",
-            raw=index,
-            acts=tuple(acts),
-            required=True,
-        )
+        return Field(path, say("form_order"), "opened", raw=index, acts=tuple(acts), required=True)
+
+    def _locks(self, path: Path, table: Mapping[str, Any]) -> Iterator[Field]:
+        """The commands that an interlock locks, and those that it may lock too."""
+        own = plain(table.get("id"))
+        links, choices = [], []
+        for at, widget in widgets(self.tables):
+            known = _strings(widget.get("interlock"))
+            if own and own in known:
+                links.append(Link(at, title_of(widget), plain(widget.get("label"), self.language)))
+            elif own and is_command(_kind_tables().get(str(widget.get("kind")), "")):
+                value = [*known, own] if known else own
+                edit = {"op": "set", "path": [*at, "interlock"], "value": value}
+                choices.append(Choice([edit], title_of(widget)))
+        name = say("form_locks")
+        if links:
+            yield Field((*path, "locks"), name, "opened", raw=links, links=tuple(links))
+        if choices:
+            unset = say("form_lock_another" if links else "form_locks_nothing")
+            yield Field(
+                (*path, "lock"),
+                "" if links else name,
+                "choice",
+                unset=unset,
+                choices=tuple(choices),
+                by_edits=True,
+            )
 
     def _moves(self, path: Path, choices: Sequence[Choice]) -> Iterator[Choice]:
         for choice in choices:
@@ -783,7 +840,7 @@ class _Maker:
         own_unit = plain(table.get("unit"), self.language) if key in IN_THE_UNIT else ""
         return replace(
             made,
-            name=key_name(key),
+            name=key_name(key, name),
             raw=table.get(key),
             default=made.default or ("" if default is None else _shown(default)),
             unset=_unset(name, key),
@@ -835,7 +892,7 @@ class _Maker:
         if key == "id":
             return Field(path, "", "id", value=plain(value))
         if key == "kind" and (name in _kind_tables().values() or name == WIDGET):
-            kinds = tuple(Choice(kind, kind, kind == value) for kind in KINDS)
+            kinds = tuple(Choice(kind, _kind_text(kind), kind == value) for kind in KINDS)
             return Field(path, "", "kind", value=plain(value), choices=kinds)
         inner = _inner(prop)
         if inner is not None:
@@ -843,7 +900,8 @@ class _Maker:
         if key == "texts" and name == ROOT:
             return self._named(path, "texts", value)
         if (names := references(name, key)) is not None:
-            return self._reference(path, value, names, prop)
+            ids = self._reference(path, value, names, prop)
+            return replace(ids, acts=self._new_lock(path, ids)) if key == "interlock" else ids
         if key in ("priority", "critical_priority", "priorities", "sound_priorities") and (
             prop.get("type") in ("integer", "array")
         ):
@@ -863,7 +921,8 @@ class _Maker:
         options = prop.get("anyOf", ())
         kinds = {option.get("type") for option in options}
         if any("additionalProperties" in option for option in options):
-            return self._texts(path, value)
+            tall = path[-1] in LONG_TEXTS or "\n" in _texts_in(value)
+            return replace(self._texts(path, value), tall=tall)
         if options and any("enum" in option for option in options):  # true, false, "pin"
             values = [v for o in options for v in o.get("enum", [False, True])]
             return _choices(path, value, values)
@@ -1047,6 +1106,18 @@ class _Maker:
             known.append(Named(value, say("form_not_in_file")))
         choices = [Choice(each.id, _id_text(each), each.id == value) for each in known]
         return Field(path, "", "choice", value=plain(value), choices=tuple(choices), of_ids=True)
+
+    def _new_lock(self, path: Path, ids: Field) -> tuple[Act, ...]:
+        """The button that adds an interlock to the file, which locks this command."""
+        listed = list_of(self.tables.get("interlock"))
+        made = new_id(self.tables, "interlock")
+        ticked = [choice.value for choice in ids.choices if choice.chosen]
+        edits: Edits = (
+            {"op": "insert", "path": ["interlock", len(listed)], "value": {"id": made}},
+            {"op": "set", "path": [*path], "value": [*ticked, made] if ticked else made},
+        )
+        text = say("form_add_table", name=table_name("interlock"))
+        return (Act(text, "plus", edits, opens=("interlock", len(listed))),)
 
     def _ticks(self, path: Path, value: Any, known: Sequence[Named], single: bool = False) -> Field:
         ticked = _strings(value)
@@ -1277,9 +1348,23 @@ def _order(each: Field) -> tuple[bool, bool, int]:
     return is_table and not each.required, not each.required, at + (each.key == "qos")
 
 
-def _has_other_cause(table: Mapping[str, Any]) -> bool:
-    """Whether an alarm is raised by something else than limits."""
-    return not any(key in table for key in LIMITS) and any(key in table for key in RAISED_BY)
+def _other_keys(table: Mapping[str, Any]) -> tuple[str, ...]:
+    """The keys of an alarm that go with another cause than it has."""
+    if any(key in table for key in LIMITS):
+        return RAISED_BY
+    if any(key in table for key in RAISED_BY):
+        return (*ONLY_WITH_LIMITS, *RAISED_BY)
+    return ()
+
+
+def _kind_text(kind: str) -> TextLike:
+    """The name of a kind as people say it, and as the file does."""
+    return say("form_kind", name=KIND_NAMES[kind], kind=kind) if kind in KIND_NAMES else kind
+
+
+def _texts_in(value: Any) -> str:
+    """All languages of a text."""
+    return "".join(map(str, value.values())) if isinstance(value, Mapping) else str(value or "")
 
 
 def _paired(
@@ -1306,13 +1391,13 @@ def _is_short(each: Field) -> bool:
     if each.control == "choice":
         return not each.side_by_side and not each.by_edits
     if each.control == "texts":
-        return len(each.texts) == 1
+        return len(each.texts) == 1 and not each.tall
     short = ("id", "kind", "number", "text")
     return each.control in short and not each.acts and not (each.choices and each.control == "number")
 
 
 def _is_shown(each: Field) -> bool:
-    if each.of_ids and not each.choices:
+    if each.of_ids and not each.choices and not each.acts:
         return each.is_set or each.required
     if each.control == "fields" and each.key in MESSAGES and not each.choices:
         return each.is_set or each.required or bool(each.faults)
@@ -1341,9 +1426,7 @@ def _is_same(value: Any, other: Any) -> bool:
 def _unset(name: str, key: str) -> TextLike:
     if key != "needs":
         return ""
-    kind = KINDS.get(name)
-    commands = kind is not None and issubclass(kind.model, Command)
-    return say("role_operator") if commands else say("form_everybody")
+    return say("role_operator") if is_command(name) else say("form_everybody")
 
 
 def _choice_name(value: Any) -> TextLike:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from app.panel.file.toml_lines import Path
 from app.system.texts import Text, say
 from app.tools.editor.references import OWNERS, taken_ids
-from app.tools.editor.suggestions import Drop, Suggestion, drop_of
+from app.tools.editor.suggestions import Drop, Suggestion, drop_of, lock_by
 from app.tools.scaffold.parts import id_of
 
 
@@ -90,10 +90,11 @@ FAMILY_NAMES: Final[Mapping[str, Text]] = {
 }
 
 
-def added(kind: str, label: Any, tables: Mapping[str, Any], at: Path) -> Drop:
+def added(kind: str, label: Any, tables: Mapping[str, Any], at: Path, on: Path | None = None) -> Drop:
     """The edits that add a table of this kind with a label. A widget is inserted `at` its place in a
     list of widgets, a group `at` its place in a page's groups, others at the end of their lists. Keys
-    that it needs and that only a person knows are missing: `check` names them."""
+    that it needs and that only a person knows are missing: `check` names them. An interlock locks the
+    command `on`, if there is one."""
     if kind not in NO_WIDGETS:
         return drop_of(Suggestion("widget", kind, {"label": label}, kind), tables, at)
     if kind == "group":
@@ -103,7 +104,10 @@ def added(kind: str, label: Any, tables: Mapping[str, Any], at: Path) -> Drop:
     keys = named.get(kind, {"label": label})
     value = {"id": id_of(kind, taken_ids(tables)[OWNERS[(kind,)]]), **keys}
     place = (kind, len(listed))
-    return Drop([{"op": "insert", "path": [*place], "value": value}], place)
+    edits: list[Mapping[str, Any]] = [{"op": "insert", "path": [*place], "value": value}]
+    if on is not None and (lock := lock_by(tables, on, str(value["id"]))):
+        edits.append(lock)
+    return Drop(edits, place)
 
 
 def place_near(tables: Mapping[str, Any], near: Path, page_id: str, *, group: bool = False) -> Path:

@@ -10,13 +10,16 @@ from app.system.errors import InterfaceError, NotFound, Remark
 from app.system.pictures import shipped_pictures
 from app.system.texts import TextLike, render, say
 from app.system.texts.locales import own_name
-from app.tools.editor.adding import parts_pane, pick_pane, robot_pane
+from app.tools.editor.adding import empty_pane, parts_pane, pick_pane, robot_pane
+from app.tools.editor.alarm_curve import curve_pane
 from app.tools.editor.document import DiffLine
 from app.tools.editor.editor import Editor, Part, PartRequest
+from app.tools.editor.form_keys import list_of
 from app.tools.editor.forms import FormPage, Link, RobotNames, form_context, form_of, table_path
 from app.tools.editor.merge_page import merge_page, recovered_page
-from app.tools.editor.outline import outline
+from app.tools.editor.outline import outline, text_of
 from app.tools.editor.paths import (
+    EMPTY,
     at,
     kind_of,
     path_at,
@@ -58,6 +61,7 @@ WORDS: Final = {
     "theme": say("editor_theme"),
     "mode": say("editor_mode"),
     "preview": say("editor_preview"),
+    "before_faults": say("editor_before_faults"),
     "preview_keys": say("editor_preview_keys"),
     "file_pane": say("editor_file_pane"),
     "table_pane": say("editor_table_pane"),
@@ -67,6 +71,10 @@ WORDS: Final = {
     "conflict": say("editor_conflict"),
     "lost": say("editor_lost"),
     "start": say("editor_start"),
+    "empty_place": say("editor_empty_place"),
+    "fill_place": say("editor_fill_place"),
+    "curve": say("editor_curve"),
+    "write_again": say("editor_write_again"),
 }
 
 
@@ -104,10 +112,11 @@ def _pages(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     """The keys of the panel's pages, below the preview."""
     panel = request.editor.preview.panel
     shown = request.query.get("language", "") or (panel.language if panel else "")
-    pages = [
-        PageTab(page.id, render(page.title, shown), page.icon or "")
-        for page in (panel.pages if panel else ())
-    ]
+    if panel is None:  # the file was never good: its pages, as far as it says them
+        tables = list_of(request.editor.document.tables.get("page"))
+        pages = [PageTab(str(page.get("id", "")), text_of(page, shown), "") for page in tables]
+        return "_pages.html", {"pages": pages, "add": say("editor_add_page")}
+    pages = [PageTab(page.id, render(page.title, shown), page.icon or "") for page in panel.pages]
     return "_pages.html", {"pages": pages, "add": say("editor_add_page")}
 
 
@@ -226,6 +235,8 @@ def _with_gaps(lines: Sequence[DiffLine], total: int) -> list[tuple[str, int, Te
 def _form(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     """The form of the selected table, the tables that refer to it, or its text."""
     editor, query, tables = request.editor, request.query, request.editor.document.tables
+    if request.path[-1:] == (EMPTY,) and len(request.path) > 2:
+        return empty_pane(request)
     path = table_path(tables, request.path)
     used = [*_users(editor, path)]
     form = form_of(
@@ -319,6 +330,7 @@ PARTS: Final[Mapping[str, Part]] = {
     "faults": _faults,
     "diff": _diff,
     "form": _form,
+    "curve": curve_pane,
     "delete": _delete,
     "merge": merge_page,
     "recovered": recovered_page,

@@ -7,7 +7,7 @@ from typing import Any, Final
 from app.panel.file.toml_lines import Path
 from app.system.texts import say
 from app.tools.editor.document import EditError, Paste
-from app.tools.editor.paths import Tables, at
+from app.tools.editor.paths import EMPTY, Tables, at
 
 _HEADER: Final = re.compile(r"^[ \t]*\[\[([A-Za-z0-9_.-]+)\]\]", re.MULTILINE)
 
@@ -33,6 +33,10 @@ def paste(tables: Tables, selected: Path, text: str) -> Paste:
 
 def _target(tables: Tables, selected: Path, kind: str) -> Path | None:
     """The path of a new table of a kind; None where there is no place for it."""
+    if selected[-1:] == (EMPTY,):
+        if selected[-3] == kind:
+            return selected[:-1]
+        selected = selected[:-3]
     for end in range(len(selected), 0, -1):  # beside one of its kind
         if isinstance(selected[end - 1], int) and selected[end - 2] == kind:
             return (*selected[: end - 1], int(selected[end - 1]) + 1)

@@ -9,6 +9,7 @@ from app.panel.file.toml_lines import Path
 from app.tools.editor.document import path_from
 
 _STEP: Final = re.compile(r"\.?([A-Za-z0-9_-]+)|\[(\d+)\]")
+EMPTY: Final = "+"  # the last step of the path of an empty place: a table would come before it
 TITLED: Final = ("id", "title", "name", "label", "text", "topic")
 
 Tables = Mapping[str, Any]

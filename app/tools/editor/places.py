@@ -1,12 +1,12 @@
 """Where the tables of a panel file are on a page, by CSS selectors of the page's markup."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from app.panel import Panel
 from app.panel.file.toml_lines import Path
 from app.panel.layout import COLUMNS, Page
-from app.tools.editor.paths import Tables, at, tag_of, widget_paths
+from app.tools.editor.paths import EMPTY, Tables, at, tag_of, widget_paths
 
 
 class GridSize(NamedTuple):
@@ -18,12 +18,14 @@ class GridSize(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A part of a page: `path` is its table's, `tag` what it is called. Parts inside come later."""
+    """A part of a page: `path` is its table's, `tag` what it is called. Parts inside come later. With
+    `beside` it is empty: the room that these parts leave in the element, where a new table comes."""
 
     path: Path
     selector: str
     tag: str
     size: GridSize | None = None
+    beside: tuple[str, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
         return self._asdict() | {"size": self.size._asdict() if self.size else None}
@@ -54,10 +56,13 @@ def places_on(page: Page, panel: Panel, tables: Tables) -> Iterator[Place]:
 
 def _on_page(page: Page, path: Path, by_id: dict[str, Path], tables: Tables) -> Iterator[Place]:
     shift = 1 if page.own else 0
+    inside: dict[Path, list[str]] = {(*path, "group", number): [] for number in range(len(page.groups))}
+    groups = [f'.group[data-group="{number}"]' for number in range(len(page.parts))]
+    yield _empty((*path, "group" if groups else "widget", len(page.groups)), "main", groups)
     for number, group in enumerate(page.groups):
         own = (*path, "group", number)
         size = GridSize(group.span, 1, COLUMNS)
-        yield Place(own, f'.group[data-group="{number + shift}"]', tag_of(tables, own), size)
+        yield Place(own, groups[number + shift], tag_of(tables, own), size)
     for place, widget in page.placed():
         steps = _steps(place)
         own = by_id.get(str(widget.id), ())
@@ -65,7 +70,16 @@ def _on_page(page: Page, path: Path, by_id: dict[str, Path], tables: Tables) -> 
             own = (*path, *steps)
         around = page.groups[int(steps[1])] if steps[0] == "group" else page.parts[0]
         size = GridSize(around.span_of(widget), widget.rows, around.grid)
-        yield Place(own, f'[id="at-{widget.id}"]', tag_of(tables, own), size)
+        selector = f'[id="at-{widget.id}"]'
+        inside.setdefault(own[:-2], []).append(selector)
+        yield Place(own, selector, tag_of(tables, own), size)
+    for outer, selectors in inside.items():
+        part = int(outer[-1]) + shift if outer[-2] == "group" else 0
+        yield _empty((*outer, "widget", len(selectors)), groups[part], selectors)
+
+
+def _empty(path: Path, selector: str, beside: Sequence[str]) -> Place:
+    return Place((*path, EMPTY), selector, "", None, tuple(beside))
 
 
 def _steps(place: str) -> Path:

@@ -3,12 +3,13 @@ services, actions and parameters, and where the panel uses each. It only reads f
 
 import asyncio
 import logging
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice, pairwise
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, TypeVar, get_args
 
 from app.panel import Panel
 from app.panel.demo import STORIES
@@ -27,7 +28,7 @@ from app.ros.graph.node_services import NodeParameter, NodeServices
 from app.ros.messages import Interfaces, Type, load_interfaces
 from app.ros.messages.definitions import attribute_name
 from app.ros.messages.validation import format_value
-from app.system.errors import DecodeError, KioskError
+from app.system.errors import DecodeError, InterfaceError, KioskError
 from app.system.texts import TextLike, say
 from app.tools.editor.suggestions import Item, Suggestions, suggestions_for
 from app.tools.robot.link import Place, opened
@@ -56,6 +57,7 @@ NOT_LISTENED: Final = frozenset(
         *("tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"),
     )
 )
+Named = TypeVar("Named", SurveyedTopic, Server)
 Section = Literal["topics", "services", "actions", "parameters"]
 SECTIONS: Final[Sequence[Section]] = get_args(Section)
 # The key by which a command names what it acts on.
@@ -99,6 +101,62 @@ class Latest:
         return max(after - before for before, after in pairwise(self.arrivals))
 
 
+# What is recorded of the topics of alarms.
+
+Sample = tuple[float, float]  # seconds, value
+MOST_RECORDED: Final = 50  # topics
+MOST_SAMPLES: Final = 6_000
+EVERY_S: Final = 0.1
+LARGEST_KEPT: Final = 4_096  # bytes of a message
+MOST_BYTES: Final = 1_000_000
+
+
+@dataclass(slots=True)
+class Recording:
+    """The newest messages of a topic, at most ten a second; `at` in monotonic seconds."""
+
+    type: str
+    payloads: deque[tuple[float, bytes]] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
+    total: int = 0
+    size: int = 0
+    decoded: dict[str, tuple[int, deque[Sample]]] = field(default_factory=dict)
+
+    def add(self, at: float, payload: bytes) -> None:
+        if len(payload) > LARGEST_KEPT or (self.payloads and at - self.payloads[-1][0] < EVERY_S):
+            return
+        if len(self.payloads) == MOST_SAMPLES:
+            self.size -= len(self.payloads[0][1])
+        self.payloads.append((at, payload))
+        self.total, self.size = self.total + 1, self.size + len(payload)
+        while self.size > MOST_BYTES:
+            self.size -= len(self.payloads.popleft()[1])
+
+    def values(self, path: str, interfaces: Interfaces) -> Sequence[Sample]:
+        """The values of a field; messages without a number there are left out."""
+        total, values = self.decoded.get(path, (0, deque[Sample](maxlen=MOST_SAMPLES)))
+        if total != self.total:
+            new = min(self.total - total, len(self.payloads))
+            values.extend(_values(list(self.payloads)[-new:], self.type, path, interfaces))
+            self.decoded = {path: (self.total, values)}
+        return values
+
+
+def _values(
+    payloads: Sequence[tuple[float, bytes]], type_name: str, path: str, interfaces: Interfaces
+) -> Iterator[Sample]:
+    try:
+        reader = interfaces.field_reader(type_name, (path,))
+    except InterfaceError:
+        return
+    for at, payload in payloads:
+        try:
+            value = reader.read(payload).get(path)
+        except DecodeError:
+            continue
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            yield at, float(value)
+
+
 class RobotList:
     """Reads the robot while a browser shows the list. Used on the event loop."""
 
@@ -114,6 +172,7 @@ class RobotList:
         self._names: object = None
         self.robot: RobotGraph | None = None
         self._latest: dict[str, Latest] = {}
+        self._recordings: dict[str, Recording] = {}
         self._parameters: dict[str, NodeParameter] = {}
 
     def look(self) -> None:
@@ -191,9 +250,11 @@ class RobotList:
         async with opened(place) as (observer, _):
             own = [endpoint_for(topic, topic.type) for topic in wanted.values()]
             async for key, sample in observer.listen(own):
-                latest = self._latest.setdefault(wanted[key].name, Latest())
+                latest = self._latest.setdefault(wanted[key].key, Latest())
                 payload = bytes(sample.payload)
                 latest.payload = payload if len(payload) <= LARGEST else b""
+                if key in self._recordings:
+                    self._recordings[key].add(sample.at, payload)
                 if not sample.cached:
                     latest.arrivals = [*latest.arrivals[1 - ARRIVALS :], sample.at]
 
@@ -207,6 +268,18 @@ class RobotList:
                 for parameter in await services.parameters(node) or ():
                     read[f"{parameter.node} {parameter.name}"] = parameter
         self._parameters = read
+
+    def recording(self, name: str, panel: Panel | None) -> Recording | None:
+        """What was recorded of a topic, from the first call on; None for a topic that is not there."""
+        topic = self._items(panel).get(("topics", name))
+        if not isinstance(topic, SurveyedTopic) or not topic.publishers:
+            return None
+        known = self._recordings.get(topic.key)
+        if known is None or known.type != topic.type:
+            if len(self._recordings) >= MOST_RECORDED:
+                del self._recordings[next(iter(self._recordings))]
+            known = self._recordings[topic.key] = Recording(topic.type)
+        return known
 
     # The rows.
 
@@ -231,7 +304,7 @@ class RobotList:
 
     def rows(self, panel: Panel | None) -> Mapping[Section, Sequence[Row]]:
         """All rows by section; of a panel with a story, also what its simulated robot can play."""
-        interfaces = self._interfaces(panel)
+        interfaces = self.interfaces(panel)
         used = uses_of(panel) if panel else {}
         rows: dict[Section, list[Row]] = {name: [] for name in SECTIONS}
         for (section, key), item in self._items(panel).items():
@@ -250,10 +323,11 @@ class RobotList:
 
     def values(self, panel: Panel | None) -> dict[str, TextLike]:
         """The newest values of topics by their names."""
-        interfaces = self._interfaces(panel)
-        topics = self.robot.topics if self.robot else ()
+        interfaces = self.interfaces(panel)
         return {
-            topic.name: self.value(topic, interfaces) for topic in topics if topic.name in self._latest
+            item.name: self.value(item, interfaces)
+            for item in self._items(panel).values()
+            if isinstance(item, SurveyedTopic) and item.key in self._latest
         }
 
     def types(self, section: Section, panel: Panel | None) -> Mapping[str, str]:
@@ -268,10 +342,12 @@ class RobotList:
 
     def field_values(self, name: str, panel: Panel | None) -> Mapping[str, str]:
         """The newest values of a topic's plain fields, by their paths."""
-        interfaces = self._interfaces(panel)
-        topic = next((t for t in (self.robot.topics if self.robot else ()) if t.name == name), None)
-        message = topic and self.sample(topic, interfaces)
-        if topic is None or message is None:
+        interfaces = self.interfaces(panel)
+        topic = self._items(panel).get(("topics", name))
+        if not isinstance(topic, SurveyedTopic):
+            return {}
+        message = self.sample(topic, interfaces)
+        if message is None:
             return {}
         values = fields_of(message, Type(topic.type), interfaces)
         return dict(islice(values, MOST_FIELDS))
@@ -283,7 +359,7 @@ class RobotList:
 
     def sample(self, topic: SurveyedTopic, interfaces: Interfaces) -> Any:
         """The newest message of a topic; None without one that can be read."""
-        latest = self._latest.get(topic.name)
+        latest = self._latest.get(topic.key)
         if latest is None or not latest.payload:
             return None
         with suppress(DecodeError, KeyError):
@@ -295,32 +371,49 @@ class RobotList:
         item = self._items(panel).get((section, key))
         if item is None:
             return None
-        interfaces = self._interfaces(panel)
+        interfaces = self.interfaces(panel)
         if not isinstance(item, SurveyedTopic):
             return suggestions_for(item, interfaces)
-        latest = self._latest.get(item.name, Latest())
+        latest = self._latest.get(item.key, Latest())
         return suggestions_for(item, interfaces, self.sample(item, interfaces), latest.period_s)
 
     def _items(self, panel: Panel | None) -> dict[tuple[Section, str], Item]:
         items: dict[tuple[Section, str], Item] = {}
         robot = self.robot
         if robot is not None:
-            for topic in public_topics(robot.topics):
+            own = partial(_as_panel_names, namespace=_namespace(panel, robot))
+            for topic in map(own, public_topics(robot.topics)):
                 items["topics", topic.name] = topic
-            for service in robot.services:
+            for service in map(own, robot.services):
                 if service.name.rpartition("/")[2] not in SERVICES_OF_EVERY_NODE:
                     items["services", service.name] = service
-            items |= {("actions", action.name): action for action in robot.actions}
+            items |= {("actions", action.name): action for action in map(own, robot.actions)}
             items |= {("parameters", key): parameter for key, parameter in self._parameters.items()}
         if panel is not None and panel.demo_story is not None:
             for section, item in story_items(panel):
                 items.setdefault((section, item.name), item)
         return items
 
-    def _interfaces(self, panel: Panel | None) -> Interfaces:
+    def interfaces(self, panel: Panel | None) -> Interfaces:
+        """The message types of a panel."""
         return (
             load_interfaces(panel.distro, panel.interfaces) if panel else load_interfaces("jazzy", ())
         )
+
+
+def _namespace(panel: Panel | None, robot: RobotGraph) -> str:
+    """The namespace that the panel puts before its names, if the nodes carry it themselves; else ""."""
+    if panel is None:
+        return ""
+    namespace = (panel.robots[0] if panel.robots else panel).namespace.rstrip("/")
+    return "" if namespace == robot.namespace else namespace
+
+
+def _as_panel_names(item: Named, namespace: str) -> Named:
+    """The item by the name that the panel file has for it."""
+    if not namespace or not item.name.startswith(f"{namespace}/"):
+        return item
+    return replace(item, name=item.name.removeprefix(namespace))
 
 
 def fullest(graph: GraphSnapshot) -> RobotGraph:

@@ -53,7 +53,7 @@ LONGEST_BODY: Final = 4_000_000  # bytes: a whole file is one edit
 NOT_KEPT: Final = {"cache-control": "no-store"}
 SHEET: Final = "editor.css"
 # Before the editor's own style.
-LAYERS: Final = ("tokens", "priorities")
+LAYERS: Final = ("tokens", "priorities", "alarm-line")
 SHARED_SCRIPTS: Final = ("in-place.js",)
 
 
@@ -85,6 +85,12 @@ class Recovery(BaseModel):
     """Whether to go on with what was not saved."""
 
     take: bool
+
+
+class Saving(BaseModel):
+    """`recreate`: also if the file was removed."""
+
+    recreate: bool = False
 
 
 class Selected(BaseModel):
@@ -311,8 +317,8 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
         return _step(request, editor, editor.redo)
 
     @app.post("/save")
-    async def save(request: Request, editor: CurrentEditor) -> Response:
-        problem = editor.save()
+    async def save(posted: Saving, request: Request, editor: CurrentEditor) -> Response:
+        problem = editor.save(recreate=posted.recreate)
         return _json(request, editor.state("") | ({"message": problem} if problem else {}))
 
     @app.post("/resolve")

@@ -160,9 +160,14 @@ def _shipped() -> dict[str, FilePath]:
 def _others(editor: Editor) -> Mapping[str, FilePath]:
     """The panel files beside the one that is edited, then the shipped ones, by their names."""
     own = editor.session.path
-    beside = [path for path in sorted(own.parent.glob("*.toml")) if path.name != own.name]
-    named = {path.name: path for path in beside[:MOST_FILES]}
-    return {name: path for name, path in (named | _shipped()).items() if _is_panel(path)}
+    named = {name: path for name, path in panels_in(own.parent).items() if name != own.name}
+    return named | {name: path for name, path in _shipped().items() if _is_panel(path)}
+
+
+def panels_in(folder: FilePath) -> Mapping[str, FilePath]:
+    """The panel files of a folder by their names."""
+    files = sorted(folder.glob("*.toml"))[:MOST_FILES]
+    return {path.name: path for path in files if _is_panel(path)}
 
 
 def _is_panel(path: FilePath) -> bool:

@@ -21,7 +21,7 @@ from app.system.errors import InterfaceError
 from app.system.texts import TextLike, say
 from app.tools.editor.references import OWNERS, taken_ids
 from app.tools.scaffold import widgets
-from app.tools.scaffold.parts import NEGATIVE, DraftWidget, Omission, id_of, label_of, permits
+from app.tools.scaffold.parts import NEGATIVE, NUMBERS, DraftWidget, Omission, id_of, label_of, permits
 from app.tools.scaffold.widgets import BOOL
 
 Where = Literal["widget", "alarm", "interlock"]
@@ -39,6 +39,7 @@ KEPT: Final = "8h"
 AGE_S: Final = 2.0
 # The part of a group's columns that a new widget takes.
 HALF, THIRD = 1 / 2, 1 / 3
+ANY_SCALE: Final = (0, 100)
 WIDE: Final = (
     *("trend", "table", "joints", "camera", "map", "pallet", "sequence", "conditions", "log"),
     *("alarm_list", "alarm_line", "label"),
@@ -75,7 +76,10 @@ def suggestions_for(
     except InterfaceError as error:
         return Suggestions(why_none=str(error))
     choices = [
-        choice for draft in drafts if isinstance(draft, DraftWidget) for choice in _choices(draft)
+        choice
+        for draft in drafts
+        if isinstance(draft, DraftWidget)
+        for choice in _choices(draft, _is_number(draft, interfaces))
     ]
     if isinstance(item, SurveyedTopic) and item.type == BOOL and item.publishers:
         choices.insert(0 if permits(item.name) else len(choices), _interlock(item))
@@ -99,8 +103,18 @@ def _drafts(
             yield from widgets.publishers(item, interfaces, has_dds_qos=True)
 
 
-def _choices(draft: DraftWidget) -> Iterator[Suggestion]:
-    """The drafted widget, and the others that fit its value."""
+def _is_number(draft: DraftWidget, interfaces: Interfaces) -> bool:
+    """Whether the value of a drafted display is a number, by its type alone: it may have none yet."""
+    if draft.kind == "gauge":
+        return True
+    if draft.kind != "readout" or "constants" in draft.keys:
+        return False
+    return interfaces.field_type(draft.keys["type"], draft.keys.get("field", "data")) in NUMBERS
+
+
+def _choices(draft: DraftWidget, is_number: bool) -> Iterator[Suggestion]:
+    """The drafted widget, and the others that fit its value. The scale of a number that was never seen
+    is a guess."""
     keys = _without_size(draft.keys)
     about: TextLike = ""
     if draft.kind == "gauge":
@@ -109,7 +123,6 @@ def _choices(draft: DraftWidget) -> Iterator[Suggestion]:
     yield Suggestion("widget", draft.kind, keys, draft.name, about)
     if draft.kind == "indicator" and [state["value"] for state in keys["states"]] == [True, False]:
         yield _bool_alarm(draft, keys)
-    is_number = draft.kind == "gauge" or (draft.kind == "readout" and "format" in keys)
     if not is_number:
         return
     shown: dict[str, Any] = {"label": keys["label"]}
@@ -122,8 +135,11 @@ def _choices(draft: DraftWidget) -> Iterator[Suggestion]:
     yield Suggestion(
         "widget", "trend", trend, f"{draft.name}/trend", say("editor_last_minutes", minutes=10)
     )
-    if draft.kind == "gauge":
-        yield _limit_alarm(draft, keys)
+    if draft.kind != "gauge":
+        keys = {**keys, "min": ANY_SCALE[0], "max": ANY_SCALE[1]}
+        about = say("editor_from_to", low=f"{keys['min']}", high=f"{keys['max']}")
+        yield Suggestion("widget", "gauge", keys, draft.name, about)
+    yield _limit_alarm(draft, keys)
 
 
 def _without_size(keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -212,7 +228,7 @@ def drop_of(
         edits.append({"op": "insert", "path": [suggestion.where, number], "value": value})
     else:
         own_id = str(listed[number]["id"])
-    if suggestion.where == "interlock" and on is not None and (lock := _lock(tables, on, own_id)):
+    if suggestion.where == "interlock" and on is not None and (lock := lock_by(tables, on, own_id)):
         edits.append(lock)
     return Drop(edits, (suggestion.where, number))
 
@@ -239,7 +255,7 @@ def _same_interlock(suggestion: Suggestion, listed: Sequence[Mapping[str, Any]])
     return None
 
 
-def _lock(tables: Any, on: Path, interlock: str) -> Mapping[str, Any] | None:
+def lock_by(tables: Any, on: Path, interlock: str) -> Mapping[str, Any] | None:
     """The edit by which an interlock locks a command; None for a widget that is none, or has it."""
     widget = tables
     for step in on:

@@ -1,5 +1,5 @@
 // The panes "Robot" and "Parts": live values, search, and adding by a drag to the page or by Enter.
-import { placeAt, pointOf } from "./arrange.js";
+import { emptyPlace, placeAt, pointOf } from "./arrange.js";
 import { dropOfNew, showMark } from "./change.js";
 import { fill, onPane } from "./panes.js";
 import { shownPage } from "./preview.js";
@@ -13,6 +13,7 @@ const VALUES_MS = 1000;
 const DRAGGED_PX = 5;
 
 const left = /** @type {HTMLElement} */ (document.getElementById("left"));
+const form = /** @type {HTMLElement} */ (document.getElementById("form"));
 const overlay = /** @type {HTMLElement} */ (document.getElementById("overlay"));
 const ask = /** @type {HTMLDialogElement} */ (document.getElementById("ask"));
 
@@ -53,7 +54,7 @@ async function refresh() {
 /** @param {HTMLElement} item @param {Target} target @param {{ x: number, y: number }} point */
 async function addItem(item, target, point) {
   const near = selection();
-  const place = { ...target, near, page: shownPage() };
+  const place = { at: emptyPlace(), ...target, near, page: shownPage() };
   if (item.dataset.kindOf) {
     chosen(await add({ ...place, kind: item.dataset.kindOf }));
     return;
@@ -95,7 +96,8 @@ function onKey(event) {
   const item = event.target instanceof Element ? event.target.closest(".offer") : null;
   const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
   if (!item || !step) return;
-  const shown = items().filter((other) => !other.closest("li")?.hidden);
+  const pane = left.contains(item) ? left : form;
+  const shown = [...pane.querySelectorAll(".offer")].filter((other) => !other.closest("li")?.hidden);
   shown[shown.indexOf(item) + step]?.focus();
   event.preventDefault();
 }
@@ -145,8 +147,11 @@ function onUp(event) {
   left.addEventListener("click", (click) => click.stopPropagation(), { capture: true, once: true });
   if (!isOverPage(event)) return;
   const { x, y } = pointOf(event);
-  const on = placeAt(x, y)?.path;
-  addItem(item, { at: dropOfNew(x, y)?.to, on }, { x: event.clientX, y: event.clientY });
+  const place = placeAt(x, y);
+  const at = place?.room ? place.path.slice(0, -1) : undefined;
+  const isWidget = at?.at(-2) === "widget";
+  const target = isWidget ? { at } : { at: dropOfNew(x, y)?.to, on: place?.path };
+  addItem(item, target, { x: event.clientX, y: event.clientY });
 }
 
 function end() {
@@ -162,12 +167,14 @@ export function start() {
     sought = field.value;
     filter();
   });
-  left.addEventListener("click", (event) => {
-    const item = event.target instanceof Element ? event.target.closest(".offer") : null;
-    const box = item?.getBoundingClientRect();
-    if (item && box) addItem(item, {}, { x: box.left + 24, y: box.bottom });
-  });
-  left.addEventListener("keydown", onKey);
+  for (const pane of [left, form]) {
+    pane.addEventListener("click", (event) => {
+      const item = event.target instanceof Element ? event.target.closest(".offer") : null;
+      const box = item?.getBoundingClientRect();
+      if (item && box) addItem(item, {}, { x: box.left + 24, y: box.bottom });
+    });
+  }
+  for (const pane of [left, form]) pane.addEventListener("keydown", onKey);
   left.addEventListener("pointerdown", onDown);
   left.addEventListener("pointermove", onMove);
   left.addEventListener("pointerup", onUp);

@@ -5,16 +5,28 @@ import { get, onState, state } from "./wire.js";
 
 /** @typedef {import("./wire.js").Path} Path */
 /** @typedef {{ span: number, rows: number, columns: number }} Size */
-/** @typedef {{ path: Path, selector: string, tag: string, size: Size | null }} Place */
 /** @typedef {{ left: number, top: number, width: number, height: number }} Box */
+/**
+ * @typedef {object} Place
+ * @property {Path} path
+ * @property {string} selector
+ * @property {string} tag
+ * @property {Size | null} size
+ * @property {string[] | null} [beside] Of an empty place: the parts of the element that leave room.
+ * @property {Box} [room] Of an empty place.
+ */
 
 const TAG_ROOM = 34; // px that a name tag needs below a ring
 
 const overlay = /** @type {HTMLElement} */ (document.getElementById("overlay"));
 const spoken = /** @type {HTMLElement} */ (document.getElementById("selected"));
 
+const LEAST_ROOM = 24; // px of an empty place that can be selected
+
 /** @type {Place[]} */
 let places = [];
+/** @type {Place[]} */
+let known = []; // as the server has them: empty places are not measured yet
 /** @type {{ path: Path, message: string }[]} */
 let faulty = [];
 let asked = 0;
@@ -23,12 +35,66 @@ export const shownPlaces = () => places;
 
 // Where a part of the page is, in px of the overlay; null if the page does not show it.
 /** @param {Place} place @returns {Box | null} */
-export function boxOf(place) {
-  const element = shownDocument()?.querySelector(place.selector);
+export const boxOf = (place) => place.room ?? boxAt(place.selector);
+
+/** @param {string} selector @returns {Box | null} */
+function boxAt(selector) {
+  const element = shownDocument()?.querySelector(selector);
   const box = element?.getBoundingClientRect();
   if (!box?.width || !box.height) return null;
   const scale = shownScale();
   return { left: box.left * scale, top: box.top * scale, width: box.width * scale, height: box.height * scale };
+}
+
+// The room that parts leave in the element around them: to the right of each row, and below the last.
+/** @param {Place} place @returns {Place[]} */
+function roomsIn(place) {
+  const outer = boxAt(place.selector);
+  const boxes = (place.beside ?? []).map(boxAt);
+  if (!outer || boxes.some((box) => !box)) return [];
+  const step = Number(place.path.at(-2)) - boxes.length;
+  /** @param {number} number @param {Box} room */
+  const made = (number, room) => ({
+    ...place,
+    path: [...place.path.slice(0, -2), Math.max(0, step + number), "+"],
+    selector: `${place.selector} +${number}`,
+    tag: overlay.dataset.empty ?? "",
+    room,
+  });
+  if (!boxes.length) return [made(0, outer)];
+  const rooms = [];
+  const inset = Math.max(0, (boxes[0]?.left ?? 0) - outer.left);
+  const right = outer.left + outer.width - inset;
+  let row = { left: outer.left + inset, top: 0, bottom: 0 };
+  for (const [number, box] of boxes.entries()) {
+    if (!box) continue;
+    row = {
+      left: Math.max(box.top >= row.bottom - 1 ? 0 : row.left, box.left + box.width + inset / 2),
+      top: box.top >= row.bottom - 1 ? box.top : row.top,
+      bottom: Math.max(row.bottom, box.top + box.height),
+    };
+    const next = boxes[number + 1];
+    if (!next || next.top >= row.bottom - 1)
+      rooms.push(
+        made(number + 1, { left: row.left, top: row.top, width: right - row.left, height: row.bottom - row.top }),
+      );
+  }
+  const below = row.bottom + inset / 2;
+  const left = outer.left + inset;
+  rooms.push(
+    made(boxes.length, { left, top: below, width: right - left, height: outer.top + outer.height - below - inset / 2 }),
+  );
+  return rooms.filter(({ room }) => room.width >= LEAST_ROOM && room.height >= LEAST_ROOM);
+}
+
+// Where a new table comes if an empty place is selected.
+export function emptyPlace() {
+  const path = selection();
+  return path?.at(-1) === "+" ? path.slice(0, -1) : undefined;
+}
+
+function measure() {
+  places = known.flatMap((place) => (place.beside ? roomsIn(place) : [place]));
 }
 
 /** @param {Path | null} path */
@@ -55,7 +121,8 @@ async function askPlaces() {
   const response = await get(`/places?page=${encodeURIComponent(shownPage())}`);
   if (!response || turn !== asked) return;
   const answer = await response.json();
-  ({ places, faulty } = answer);
+  ({ places: known, faulty } = answer);
+  measure();
   markSizes(answer.fits);
   drawRings();
 }
@@ -73,12 +140,23 @@ function markSizes(fits) {
 }
 
 export function drawRings() {
-  for (const ring of overlay.querySelectorAll(".ring:not(.hover)")) ring.remove();
+  for (const ring of overlay.querySelectorAll(".ring:not(.hover), .room")) ring.remove();
+  for (const { room, beside } of places) if (room && !beside?.length) addRoom(room);
   for (const { path, message } of faulty) addRing(placeOf(path), message, "faulty");
   for (const other of state.others) addRing(placeOf(other.path), other.tag, "other");
   const place = places.find(({ path, selector }) => selector === reached && isSame(path, selection()));
   const chosen = place ?? placeOf(selection());
   if (chosen) addRing(chosen, chosen.tag, "chosen");
+}
+
+// A page or a group without anything says what to do.
+/** @param {Box} box */
+function addRoom(box) {
+  const room = document.createElement("div");
+  room.className = "room";
+  room.textContent = overlay.dataset.fill ?? "";
+  putAt(room, box);
+  overlay.prepend(room);
 }
 
 /** @param {Place | undefined} place @param {string} tag @param {string} kind */
@@ -152,7 +230,8 @@ function choose(place) {
 function chooseAround() {
   const path = selection();
   if (!path) return;
-  const outer = places.filter((place) => place.path.length < path.length && isAround(place.path, path));
+  const inner = path.at(-1) === "+" ? path.slice(0, -3) : path.slice(0, -1);
+  const outer = places.filter((place) => isAround(place.path, inner));
   choose(outer.at(-1));
 }
 
@@ -179,12 +258,14 @@ export function start() {
   });
   overlay.addEventListener("pointerleave", () => hover(undefined));
   overlay.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
+    const isHandle = event.target instanceof Element && event.target.matches(".ring.chosen i");
+    if (event.button !== 0 || isHandle) return;
     const { x, y } = pointOf(event);
     choose(placeAt(x, y));
   });
   overlay.addEventListener("dblclick", enterForm);
   onDrawn(() => {
+    measure();
     drawRings();
     askPlaces();
   });

@@ -13,6 +13,7 @@ const MARK_PX = 4;
 const WIDE = 0.6; // of its group: such a widget is alone in its row
 
 const overlay = /** @type {HTMLElement} */ (document.getElementById("overlay"));
+const left = /** @type {HTMLElement} */ (document.getElementById("left"));
 const ask = /** @type {HTMLDialogElement} */ (document.getElementById("ask"));
 
 /** @param {Path} path */
@@ -110,9 +111,8 @@ async function paste(text) {
   if (answer?.select) select(tableOf(answer.select), "edit");
 }
 
-/** @param {KeyboardEvent} event */
-function onKey(event) {
-  const path = selection();
+/** @param {KeyboardEvent} event @param {Path | null} path */
+function onKey(event, path) {
   const place = placeOf(path);
   if (!path || !isListed(path)) return;
   const isCommand = event.ctrlKey || event.metaKey;
@@ -273,7 +273,11 @@ function end() {
 }
 
 export function start() {
-  overlay.addEventListener("keydown", onKey);
+  overlay.addEventListener("keydown", (event) => onKey(event, selection()));
+  left.addEventListener("keydown", (event) => {
+    const line = event.target instanceof Element ? event.target.closest(".tr") : null;
+    if (line?.dataset.path) onKey(event, JSON.parse(line.dataset.path));
+  });
   overlay.addEventListener("pointerdown", onDown);
   overlay.addEventListener("pointermove", onMove);
   overlay.addEventListener("pointerup", onUp);

@@ -317,7 +317,8 @@ export class Form {
       const list = near(button, ".rows, .opened, .message, section, .form");
       if (!(await this.#post(JSON.parse(edits), button))) return;
       if (done !== undefined) await this.#look({ kind: "" });
-      this.#focusAfter(then, list, /^\[{"op": "(insert|set)"/.test(edits));
+      if (open !== undefined) this.#host.select(JSON.parse(open));
+      else this.#focusAfter(then, list, /^\[{"op": "(insert|set)"/.test(edits));
     } else if (pick !== undefined) await this.#look({ pick: this.#view.pick === pick ? "" : pick });
     else if (kind !== undefined) await this.#look({ kind });
     else if (open !== undefined) {

@@ -2,6 +2,7 @@
 import * as adding from "./adding.js";
 import * as arrange from "./arrange.js";
 import * as change from "./change.js";
+import * as curve from "./curve.js";
 import * as merge from "./merge.js";
 import * as outline from "./outline.js";
 import * as panes from "./panes.js";
@@ -68,6 +69,9 @@ onState((now, before) => {
   get("status").textContent = now.status;
   get("undo").toggleAttribute("disabled", !now.undo);
   get("redo").toggleAttribute("disabled", !now.redo);
+  const title = get("stage-title");
+  title.textContent = (now.faults ? title.dataset.faulty : title.dataset.good) ?? "";
+  title.classList.toggle("faulty", now.faults > 0);
   if (now.drawn !== before.drawn) areKeysOld = true;
 });
 
@@ -133,6 +137,7 @@ outline.start();
 preview.start();
 arrange.start();
 change.start();
+curve.start();
 merge.start();
 adding.start();
 starting.start();

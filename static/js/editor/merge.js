@@ -4,6 +4,7 @@ import { onState, part, postChoice, say, state, step } from "./wire.js";
 const merge = /** @type {HTMLDialogElement} */ (document.getElementById("merge"));
 const recovered = /** @type {HTMLDialogElement} */ (document.getElementById("recovered"));
 const button = /** @type {HTMLElement} */ (document.getElementById("conflict"));
+const again = /** @type {HTMLElement} */ (document.getElementById("write-again"));
 let isAsked = false; // whether to go on with what was not saved
 
 /** @param {HTMLDialogElement} dialog @param {string} name */
@@ -43,6 +44,7 @@ function onClick(event) {
 
 export function start() {
   button.addEventListener("click", openMerge);
+  again.addEventListener("click", () => step("save", { recreate: true }));
   merge.addEventListener("click", onClick);
   merge.addEventListener("submit", (event) => {
     event.preventDefault();
@@ -57,6 +59,7 @@ export function start() {
   });
   onState((now) => {
     button.hidden = !now.conflicts;
+    again.hidden = !now.gone;
     if (now.warning) say(now.warning);
     if (now.recovered && !isAsked) show(recovered, "recovered");
     isAsked = now.recovered;

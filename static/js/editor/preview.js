@@ -1,7 +1,7 @@
 // The preview: the panel's own page in a frame of a chosen size. After an edit it is drawn again at once from what the
 // server renders; when the sessions of the edited panel run, the frame is replaced by a live one.
 import { redraw } from "./redraw.js";
-import { get, onState, state } from "./wire.js";
+import { get, onState, part, state } from "./wire.js";
 
 const ROOT = "/preview";
 const COOKIE_S = 365 * 86_400;
@@ -91,11 +91,23 @@ function load() {
   coming = made;
 }
 
-// The panel has the page no longer, or by another id.
-function loadFirst() {
-  page = "";
-  base = ROOT;
+/** @type {string[]} */
+let names = []; // the ids of the pages in their order
+
+// The panel has the page no longer, or by another id: then that is the only one which is new.
+async function loadAnother() {
+  const known = await pageNames();
+  const renamed = known.length === names.length ? known.filter((name) => !names.includes(name)) : [];
+  page = renamed.length === 1 && names.indexOf(page) === known.indexOf(renamed[0]) ? renamed[0] : "";
+  names = known;
+  if (!page) base = ROOT;
   load();
+}
+
+async function pageNames() {
+  const made = document.createElement("div");
+  made.innerHTML = (await part("pages", {})) ?? "";
+  return [...made.querySelectorAll("[data-page]")].map((key) => key.getAttribute("data-page") ?? "");
 }
 
 /** @param {HTMLIFrameElement} made @param {number} number */
@@ -112,7 +124,7 @@ async function loaded(made, number) {
   const after = number < now ? await rendered(`?drawn=${now}`) : null;
   if (shown !== made.contentDocument || (made !== coming && made !== frame)) return;
   if (!before && !after && page && made === coming) {
-    loadFirst();
+    loadAnother();
     return;
   }
   if (before && after) redraw(shown, before, after);
@@ -125,6 +137,9 @@ async function loaded(made, number) {
     frames.dataset.live = String(live);
   }
   markup = after ?? before;
+  pageNames().then((known) => {
+    names = known;
+  });
   showDrawn(after ? now : number);
   if (drawn < state.drawn) await draw();
   if (state.live > live && !coming) load();
@@ -153,7 +168,7 @@ async function draw() {
   const after = await rendered(`?drawn=${wanted}`);
   if (wanted < drawn || shown !== frame?.contentDocument || before !== markup) return;
   if (!after) {
-    loadFirst();
+    loadAnother();
     return;
   }
   redraw(shown, before, after);

@@ -14,6 +14,7 @@
  * @property {boolean} redo
  * @property {number} faults
  * @property {number} conflicts With the file on the disk.
+ * @property {boolean} gone Whether the file was removed.
  * @property {boolean} recovered Whether there is work that was not saved.
  * @property {string} warning
  * @property {OtherBrowser[]} others
@@ -41,6 +42,7 @@ export let state = {
   redo: false,
   faults: 0,
   conflicts: 0,
+  gone: false,
   recovered: false,
   warning: "",
   others: [],
@@ -172,9 +174,9 @@ export function start(choice) {
   return inTurn(async () => (await send("/start", JSON.stringify({ ...choice, revision: state.revision }))).answer);
 }
 
-/** @param {"undo" | "redo" | "save"} name */
-export function step(name) {
-  return inTurn(() => post(`/${name}`));
+/** @param {"undo" | "redo" | "save"} name @param {Record<string, unknown>} [body] */
+export function step(name, body) {
+  return inTurn(() => post(`/${name}`, body));
 }
 
 /** @param {Path | null} path */

@@ -331,14 +331,25 @@ def test_axe_finds_nothing(chromium: Browser, editor: EditorServer, language: st
     viewport: Any = {"width": 1280, "height": 800}
     with chromium.new_context(viewport=viewport, locale=language, bypass_csp=True) as context:
         page = context.new_page()
+        editor.edit({"op": "insert", "path": ["alarm", 0], "value": LOAD_LOW}).raise_for_status()
         page.goto(editor.address)
+        page.evaluate(AXE)
+
+        def violations() -> Any:
+            shown = RUN.replace("document,", "{exclude: ['iframe']},")
+            return page.evaluate(shown, {"values": ALL, "type": "tag"})
+
         select(page, "#at-speed", SPEED)
         expect(page.locator("#form [data-form]")).to_be_visible()
-        page.evaluate(AXE)
-        violations = page.evaluate(
-            RUN.replace("document,", "{exclude: ['iframe']},"), {"values": ALL, "type": "tag"}
-        )
-        assert violations == []
+        assert violations() == []
+        main = box_of(page, "main")
+        page.mouse.click(*middle(main | {"y": main["y"] + main["height"] * 0.9, "height": 0}))
+        expect(page.locator("#form .offer").first).to_be_visible()
+        assert violations() == []
+        page.locator(".tr[data-path='[\"alarm\"]']").click()
+        page.locator(".tr[data-path='[\"alarm\", 0]']").click()
+        expect(page.locator("#curve .limit-flag").first).to_be_visible()
+        assert violations() == []
         wide = page.evaluate("document.documentElement.scrollWidth")
         assert wide <= 1280
 
@@ -371,7 +382,7 @@ def test_a_wrong_value_is_named_at_its_field_and_in_the_list(desk: Page) -> None
 
 def test_a_picture_is_chosen_and_shown(desk: Page) -> None:
     select(desk, "#at-speed", SPEED)
-    desk.locator("#form select[data-kinds]").select_option(label="image")
+    desk.locator("#form select[data-kinds]").select_option('"image"')
     desk.get_by_role("button", name="Apply").click()
     expect(desk.locator("#form")).to_contain_text("is missing")
     data = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 4 3"/>'
@@ -404,3 +415,92 @@ def test_a_new_file_and_a_page_of_another_are_chosen_by_keys(page: Page, tmp_pat
         assert 'id = "watch"' in editor.file.read_text()
     finally:
         editor.end()
+
+
+def test_an_empty_place_offers_what_comes_there(desk: Page, editor: EditorServer) -> None:
+    group, widget = box_of(desk, '.group[data-group="1"]'), box_of(desk, "#at-open")
+    right = widget["x"] + widget["width"]
+    desk.mouse.click((right + group["x"] + group["width"]) / 2, widget["y"] + widget["height"] / 2)
+    expect(desk.locator("#form [data-form]")).to_have_attribute(
+        "data-form", '["page", 0, "group", 1, "widget", 1, "+"]'
+    )
+    desk.locator("#overlay").press("Enter")
+    expect(desk.locator("#form .offer").first).to_be_focused()
+    desk.locator("#form [data-kind-of=label]").press("Enter")
+    until(lambda: order(editor)[3:5] == ["open", "label"], "it comes behind the group's last")
+
+
+def test_delete_in_the_outline_removes_a_table(desk: Page, editor: EditorServer) -> None:
+    line = desk.locator(".tr", has_text="Watch")
+    line.click()
+    line.press("Delete")
+    until(lambda: "Watch" not in editor.http.get("/text").text, "the page is gone")
+
+
+def test_a_removed_file_is_written_again(desk: Page, editor: EditorServer) -> None:
+    editor.file.unlink()
+    again = desk.locator("#write-again")
+    expect(again).to_be_visible()
+    again.click()
+    until(editor.file.exists, "the file is written")
+    expect(again).to_be_hidden()
+
+
+def test_a_renamed_page_stays_in_sight(desk: Page, editor: EditorServer) -> None:
+    desk.locator('#pages [data-page="watch"]').click()
+    expect(desk.locator('#pages [data-page="watch"]')).to_have_attribute("aria-current", "page")
+    editor.edit({"op": "rename", "path": ["page", 1], "id": "look"})
+    expect(desk.locator('#pages [data-page="look"]')).to_have_attribute("aria-current", "page")
+
+
+LOAD_LOW: Final = {
+    **{"id": "load_low", "topic": "/load", "type": "std_msgs/msg/Float64", "deadband": 0.5},
+    **{"low": 5.0, "high": 50.0, "text": "Load low", "action": "Add load"},
+}
+
+
+@pytest.fixture
+def curve(desk: Page, editor: EditorServer) -> Page:
+    """The page with the curve of an alarm that has two limits."""
+    editor.edit({"op": "insert", "path": ["alarm", 0], "value": LOAD_LOW}).raise_for_status()
+    desk.locator(".tr[data-path='[\"alarm\"]']").click()
+    desk.locator(".tr[data-path='[\"alarm\", 0]']").click()
+    expect(desk.locator("#curve .value")).to_have_attribute("d", re.compile("L"))
+    return desk
+
+
+def test_a_limit_is_dragged_by_its_flag_and_stays_below_the_next(
+    curve: Page, editor: EditorServer
+) -> None:
+    flag, area = curve.locator("[data-limit=low]"), curve.locator("#curve .area")
+    (start, plot) = (until(each.bounding_box, "it is there") for each in (flag, area))
+    curve.mouse.move(*middle(start))
+    curve.mouse.down()
+    curve.mouse.move(middle(start)[0], plot["y"] + 4, steps=5)
+    expect(flag).not_to_have_attribute("aria-valuenow", "5.0")
+    assert "low = 5.0" in editor.http.get("/text").text, "it is written when it is let go"
+    curve.mouse.up()
+    until(lambda: "low = 5.0" not in editor.http.get("/text").text, "the line is written")
+    low = float(re.findall(r"^low = (\S+)", editor.http.get("/text").text, re.M)[0])
+    assert 45 < low < 50
+    curve.locator("#undo").click()
+    until(lambda: "low = 5.0" in editor.http.get("/text").text, "one step of undo")
+
+
+def test_a_limit_is_moved_by_keys(curve: Page, editor: EditorServer) -> None:
+    flag = curve.locator("[data-limit=high]")
+    flag.focus()
+    for _ in range(3):
+        flag.press("ArrowDown")
+    until(lambda: "high = 50.0" not in editor.http.get("/text").text, "the line is written")
+    expect(flag).to_be_focused()
+    curve.locator("#undo").click()
+    until(lambda: "high = 50.0" in editor.http.get("/text").text, "three keys are one step")
+
+
+def test_the_curve_counts_and_shows_the_line_of_operators(curve: Page) -> None:
+    expect(curve.locator("#curve .figures b").first).to_have_text(re.compile(r"^\d+$"))
+    expect(curve.locator("#curve .alarm-line .newest b")).to_have_text("Load low")
+    curve.get_by_role("button", name="Show the page").click()
+    expect(curve.locator("#curve")).to_be_hidden()
+    expect(preview(curve).locator("#at-speed")).to_be_visible()

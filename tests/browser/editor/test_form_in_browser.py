@@ -268,7 +268,7 @@ def test_rows_are_added_moved_and_removed_by_keyboard(show: Show) -> None:
 
 def test_another_kind_says_what_goes_before_it_is_applied(show: Show) -> None:
     form = show(*BOXES)
-    form.page.locator("select[data-kinds]").select_option(label="gauge")
+    form.page.locator("select[data-kinds]").select_option('"gauge"')
     expect(form.page.get_by_text("These keys go: target")).to_be_visible()
     expect(form.page.get_by_text("These keys are needed then: min, max")).to_be_visible()
     assert form.edits == []

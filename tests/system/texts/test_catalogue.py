@@ -301,6 +301,8 @@ def test_age_is_rendered_in_words(seconds: float, text: str) -> None:
 # file, or are shown on Diagnostics. In the others `topic` is the label that operators know, by
 # `Condition.subject`, or their widget's own label stands beside them.
 NAME_TOPICS = {
+    "editor_curve_nothing",
+    "editor_curve_title",
     "look_no_topic",
     "look_not_forwarded",
     "look_title",

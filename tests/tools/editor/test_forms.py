@@ -161,11 +161,14 @@ class Elements(HTMLParser):
         super().__init__()
         self.paths: list[list[str | int]] = []
         self.edits: list[Any] = []
+        self.opens: list[list[str | int]] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         known = dict(attrs)
         if known.get("data-path"):
             self.paths.append(json.loads(str(known["data-path"])))
+        if known.get("data-open"):
+            self.opens.append(json.loads(str(known["data-open"])))
         if known.get("data-edits"):
             self.edits += json.loads(str(known["data-edits"]))
 
@@ -186,7 +189,7 @@ def test_each_field_of_a_form_is_on_the_page(name: str) -> None:
     reached |= {tuple(edit["path"]) for edit in elements.edits}
     for field in form.fields:
         below = {each[: len(field.path)] for each in reached if isinstance(each, tuple)}
-        assert field.path in below or not field.links, field.path
+        assert all([*link.path] in elements.opens for link in field.links), field.path
         if field.control not in ("opened", "rows", "table") or not field.raw:
             assert field.path in below, field.path
 
@@ -358,3 +361,88 @@ def test_the_width_is_chosen_in_parts_of_the_groups_columns() -> None:
         (6, True),
         (12, False),
     ]
+
+
+LOCKED: Final = """
+title = "Cell"
+[[interlock]]
+id = "ready"
+topic = "/ready"
+[[alarm]]
+id = "new"
+text = "New"
+[[alarm]]
+id = "hot"
+text = "Hot"
+topic = "/heat"
+type = "std_msgs/msg/Float64"
+high = 80.0
+[[alarm]]
+id = "open"
+text = "Open"
+when = { topic = "/door", type = "std_msgs/msg/Bool", equals = false }
+[[page]]
+id = "cell"
+title = "Cell"
+[[page.widget]]
+id = "go"
+kind = "call"
+label = "Go"
+service = "/go"
+type = "std_srvs/srv/Trigger"
+interlock = "ready"
+[[page.widget]]
+id = "home"
+kind = "call"
+label = "Home"
+service = "/home"
+type = "std_srvs/srv/Trigger"
+"""
+
+
+def test_an_interlock_says_what_it_locks_and_can_lock_another_command() -> None:
+    form = form_of(tomllib.loads(LOCKED), ("interlock", 0))
+    assert [link.text for link in field_at(form, ("interlock", 0, "locks")).links] == ["go"]
+    (choice,) = field_at(form, ("interlock", 0, "lock")).choices
+    assert choice.text == "home"
+    document = Document(LOCKED)
+    document.apply([*map(edit_from, choice.value)], "")
+    assert document.tables["page"][0]["widget"][1]["interlock"] == "ready"
+
+
+def test_a_command_gets_an_interlock_of_its_own_from_its_form() -> None:
+    field = field_at(form_of(tomllib.loads(LOCKED), ("page", 0, "widget", 0)), GO_LOCK)
+    (act,) = field.acts
+    document = Document(LOCKED)
+    document.apply([*map(edit_from, act.edits)], "")
+    assert document.tables["interlock"][1]["id"] == "interlock_1"
+    assert value_at(document.tables, GO_LOCK) == ["ready", "interlock_1"]
+    assert act.opens == ("interlock", 1)
+
+
+GO_LOCK: Final = ("page", 0, "widget", 0, "interlock")
+
+
+@pytest.mark.parametrize(
+    ("number", "first", "there", "folded"),
+    [
+        (0, "form_section_value", {"topic", "when", "high"}, {"list"}),
+        (1, "form_section_limits", {"topic", "high", "deadband"}, {"when", "stale_s"}),
+        (2, "form_section_value", {"when", "priority"}, {"topic", "high", "deadband", "stale_s"}),
+    ],
+)
+def test_the_form_of_an_alarm_begins_with_what_raises_it(
+    number: int, first: str, there: set[str], folded: set[str]
+) -> None:
+    form = form_of(tomllib.loads(LOCKED), ("alarm", number))
+    assert next(section.code for section in form.sections if section.code) == first
+    shown = {f.key for s in form.sections if not s.folded for f in s.fields}
+    shown |= {f.beside.key for s in form.sections if not s.folded for f in s.fields if f.beside}
+    assert there <= shown
+    assert not folded & shown
+
+
+def test_texts_of_several_lines_have_a_field_for_them() -> None:
+    action = field_at(form_of(tomllib.loads(LOCKED), ("alarm", 1)), ("alarm", 1, "action"))
+    assert action.control == "texts"
+    assert action.tall

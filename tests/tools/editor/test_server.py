@@ -1,6 +1,7 @@
 """The editor's server: who is let in, edits, panes, and the preview."""
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -222,7 +223,26 @@ def test_a_file_that_is_not_toml_is_opened_with_its_fault(tmp_path: Path) -> Non
 )
 def test_each_part_of_a_page_has_its_table(editor: EditorServer, selector: str, path: Any) -> None:
     places = editor.http.get("/places?page=cell").json()["places"]
-    assert {place["selector"]: place["path"] for place in places}[selector] == path
+    tables = {place["selector"]: place["path"] for place in places if place["beside"] is None}
+    assert tables[selector] == path
+
+
+@pytest.mark.parametrize(
+    ("path", "beside"),
+    [
+        (["page", 0, "group", 2, "+"], ['.group[data-group="0"]', '.group[data-group="1"]']),
+        (["page", 0, "group", 0, "widget", 2, "+"], ['[id="at-speed"]', '[id="at-ready"]']),
+        (["page", 0, "group", 1, "widget", 1, "+"], ['[id="at-open"]']),
+    ],
+)
+def test_the_room_that_parts_leave_is_a_place(
+    editor: EditorServer, path: list[Any], beside: list[str]
+) -> None:
+    places = editor.http.get("/places?page=cell").json()["places"]
+    assert [place["beside"] for place in places if place["path"] == path] == [beside]
+    pane = editor.part("form", path=json.dumps(path))
+    offered = re.findall(r'data-kind-of="(\w+)"', pane)
+    assert offered == ["group"] if path[-3] == "group" else "indicator" in offered
 
 
 @pytest.mark.parametrize("language", ["en", "ja", "de"])

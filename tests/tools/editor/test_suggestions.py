@@ -61,7 +61,7 @@ def topic(name: str, kind: str, *, sent: bool = True, latched: bool = False) -> 
 ITEMS: Final[list[tuple[Item, str]]] = [
     (topic("/temperature", "sensor_msgs/msg/Temperature"), "gauge figure readout trend alarm"),
     (topic("/air_pressure", "sensor_msgs/msg/FluidPressure"), "gauge figure readout trend alarm"),
-    (topic("/boxes", "std_msgs/msg/UInt32"), "readout"),
+    (topic("/boxes", "std_msgs/msg/UInt32"), "readout figure trend gauge alarm"),
     (topic("/speed", "std_msgs/msg/Float64"), "gauge figure readout trend alarm"),
     (topic("/operation_enabled", BOOL), "interlock indicator alarm"),
     (topic("/gripper_fault", BOOL), "indicator alarm interlock"),
