@@ -144,9 +144,18 @@ class Page(NeedsKey, RobotKey):
 
     def placed(self) -> Placed:
         """(place in the page's table, widget) of every widget: ("group[0].widget[2]", …)."""
-        yield from ((f"widget[{w}]", widget) for w, widget in enumerate(self.own))
-        for g, group in enumerate(self.groups):
-            yield from ((f"group[{g}].widget[{w}]", widget) for w, widget in enumerate(group.widgets))
+        return iter(self.placed_widgets)
+
+    @cached_property
+    def placed_widgets(self) -> tuple[tuple[str, Widget], ...]:
+        """The same, made once: each check of a panel goes through them."""
+        own = ((f"widget[{w}]", widget) for w, widget in enumerate(self.own))
+        in_groups = (
+            (f"group[{g}].widget[{w}]", widget)
+            for g, group in enumerate(self.groups)
+            for w, widget in enumerate(group.widgets)
+        )
+        return (*own, *in_groups)
 
 
 class Frame(Description):

@@ -362,7 +362,7 @@ class Document:
         if sections:
             *others, last = sections
             return "".join(section.text for section in others) + last.above + last.header + last.body
-        host, rest = _locate(self._state.paths, path)
+        host, rest = SectionIndex(self._state.paths).locate(path)
         section = self._state.sections[host]
         span = section.layout.spans.get(rest)
         if span is not None:
@@ -421,13 +421,27 @@ def _inside(paths: Sequence[Path], path: Path) -> list[int]:
     return [number for number, each in enumerate(paths) if each[: len(path)] == path]
 
 
-def _locate(paths: Sequence[Path], path: Path) -> tuple[int, Path]:
-    """The section in whose body a path is, and the path in there."""
-    best = 0
-    for number, each in enumerate(paths):
-        if len(each) >= len(paths[best]) and path[: len(each)] == each:
-            best = number
-    return best, path[len(paths[best]) :]
+class SectionIndex:
+    """Where the sections of a document are, by their paths."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._paths = paths
+        self._last = {path: number for number, path in enumerate(paths)}
+        self._around = {path[:end] for path in paths for end in range(len(path) + 1)}
+
+    def is_of(self, paths: Sequence[Path]) -> bool:
+        return self._paths is paths
+
+    def locate(self, path: Path) -> tuple[int, Path]:
+        """The section in whose body a path is, and the path in there."""
+        for end in range(len(path), 0, -1):
+            if (number := self._last.get(path[:end])) is not None:
+                return number, path[end:]
+        return self._last.get((), 0), path
+
+    def has(self, path: Path) -> bool:
+        """Whether a section is at a path, or below it."""
+        return path in self._around
 
 
 class Draft:
@@ -438,6 +452,7 @@ class Draft:
         self.paths = list(state.paths)
         self._tables: Tables | None = state.tables
         self._last = state.tables
+        self._index = SectionIndex(self.paths)
         self._unreadable = state.unreadable
 
     def state(self) -> State:
@@ -517,11 +532,16 @@ class Draft:
         return value
 
     def _in_sections(self, path: Path) -> bool:
-        return any(each[: len(path)] == path for each in self.paths)
+        return self._indexed().has(path)
+
+    def _indexed(self) -> SectionIndex:
+        if not self._index.is_of(self.paths):
+            self._index = SectionIndex(self.paths)
+        return self._index
 
     def _edit_body(self, path: Path, edit: Callable[[str, Path], str]) -> None:
         """Changes the keys of the table that a path is in."""
-        host, rest = _locate(self.paths, path)
+        host, rest = self._indexed().locate(path)
         section = self.sections[host]
         try:
             body = edit(section.body, rest)
@@ -758,7 +778,7 @@ class Draft:
 
     def _renamed_key(self, path: Path, name: str) -> str | None:
         """The text of a key and its value with another name; None if it is written with a dot."""
-        host, rest = _locate(self.paths, path)
+        host, rest = self._indexed().locate(path)
         section = self.sections[host]
         span = section.layout.spans.get(rest)
         text = section.body[span.start : span.end] if span else ""

@@ -154,7 +154,12 @@ class Preview:
     def show(self, panel: Panel, tables: Tables) -> None:
         """Draws this panel from now on; its sessions follow."""
         # Whoever edits sees all pages, in a frame of the editor's own page, and signs in nowhere.
-        rules = {"access": AccessRules(), "embed": EmbedRules()}
+        # The languages are those that it has now: no copy looks for its texts again.
+        rules = {
+            "access": AccessRules(),
+            "embed": EmbedRules(),
+            "languages": panel.readers_languages,
+        }
         self._newest = panel.model_copy(update=rules)
         self._templates.use(page_parts(self._newest))
         self.number += 1
