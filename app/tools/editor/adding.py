@@ -12,6 +12,7 @@ from app.system.errors import NotFound
 from app.system.texts import TextLike, render, say
 from app.tools.editor.document import Change, edit_from, path_from
 from app.tools.editor.editor import Editor, PartRequest
+from app.tools.editor.help import help_in
 from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, ICONS, NAMES, added, place_near
 from app.tools.editor.paths import EMPTY
 from app.tools.editor.paths import at as value_at
@@ -64,7 +65,7 @@ def _about(rows: Sequence[Row]) -> TextLike:
 def parts_pane(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     def described(table: str) -> str:
         words = WORDS["tables"]
-        return str(words.get(f"{table}_widget") or words[table]).replace("`", "")
+        return help_in(str(words.get(f"{table}_widget") or words[table]), request.language)
 
     families = [(FAMILY_NAMES[name], kinds) for name, kinds in FAMILIES.items()]
     return "_parts.html", {

@@ -50,6 +50,7 @@ from app.tools.editor.form_keys import (
     unit_of,
     widgets,
 )
+from app.tools.editor.help import help_in, plain_words
 from app.tools.editor.kinds import NAMES as KIND_NAMES
 
 Edit = Mapping[str, Any]  # as `POST /edits` takes it
@@ -112,7 +113,6 @@ MESSAGES: Final = frozenset(  # keys with the fields of what is sent
         *("request", "on_request", "off_request", "goal"),
     }
 )
-LINK: Final = re.compile(r"\[([^\]]*)\]\([^)]*\)")  # of Markdown
 # Texts that would be read as something else without quotes.
 PLAIN: Final = re.compile(r"""(true|false|[-+]?\.?[0-9].*|["'\[].*|\{[^=]*=.*|\{\s*\}|)""", re.DOTALL)
 TWELFTHS: Final = 12  # columns of a group that says nothing
@@ -327,11 +327,6 @@ class Form:
                     yield each.beside
                 for form in (*each.rows, *((each.inner,) if each.inner else ())):
                     yield from form.fields
-
-
-def plain_words(text: str) -> str:
-    """A text of the reference without its marks of Markdown."""
-    return LINK.sub(r"\1", text).replace("`", "")
 
 
 def element_id(path: Path) -> str:
@@ -661,7 +656,7 @@ class _Maker:
             tuple(self._sections(name, table, fields, path, is_row=bool(acts))),
             faults=self._faults_at(path),
             acts=acts,
-            help=str(known.get("description", "")),
+            help=help_in(str(known.get("description", "")), self.language),
         )
 
     def _note(self, path: Path, name: str, table: Mapping[str, Any]) -> TextLike:
@@ -835,7 +830,7 @@ class _Maker:
         key = str(path[-1])
         made = self._control(path, name, table, prop)
         default = prop.get("default")
-        help_text = str(prop.get("description", ""))
+        help_text = help_in(str(prop.get("description", "")), self.language)
         limits, low, high = _limits(prop)
         own_unit = plain(table.get("unit"), self.language) if key in IN_THE_UNIT else ""
         return replace(

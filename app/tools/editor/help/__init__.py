@@ -1,0 +1,32 @@
+"""What the reference says of tables and keys, in the language of who edits. Each catalogue has its
+sentences by the English ones; what it lacks stays English. Only the editor loads them."""
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from app.system.texts.catalogue import translations
+
+LINK: Final = re.compile(r"\[([^\]]*)\]\([^)]*\)")  # of Markdown
+
+
+def plain_words(text: str) -> str:
+    """A text of the reference without its marks of Markdown."""
+    return LINK.sub(r"\1", text).replace("`", "")
+
+
+def help_in(text: str, language: str) -> str:
+    """A description of the reference in plain words, in a language where there is a translation."""
+    plain = plain_words(text)
+    return help_texts(language).get(plain, plain)
+
+
+@cache
+def help_texts(language: str) -> Mapping[str, str]:
+    """English → sentence in a language; empty for a language without a catalogue."""
+    if not language.isalpha():
+        return {}
+    file = Path(__file__).with_name(f"{language}.po")
+    return translations(file) if file.is_file() else {}
