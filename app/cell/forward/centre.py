@@ -2,6 +2,7 @@
 rows in one transaction. Only this module, and the commands of the centre, use psycopg."""
 
 import os
+import re
 import socket
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,6 +73,10 @@ SENTENCES: Final[Mapping[str, str]] = {
     "OP003": "forward_sent_twice",
     "OP004": "forward_other_role",
 }
+# What libpq says before the reason why there is no connection.
+CONNECTION_WORDS: Final = re.compile(
+    r"^(connection (failed|is bad): )?connection to server .*? failed: (FATAL: +)?"
+)
 # What the server says of a connection that it refuses: psycopg has no state of these.
 REFUSED_CONNECTIONS: Final = {
     "no password supplied": "28000",
@@ -260,8 +265,9 @@ def centre_error(
     """What psycopg reports, as a sentence."""
     state = error.sqlstate or ""
     detail = (error.diag.message_detail or "") if error.diag else ""
-    why = " ".join(str(error.diag.message_primary or error if error.diag else error).split())
-    why = why[:MOST_OF_REASON]
+    primary = error.diag.message_primary if error.diag else None
+    first_line = (primary or str(error)).strip().partition("\n")[0]
+    why = " ".join(CONNECTION_WORDS.sub("", first_line).split())[:MOST_OF_REASON].rstrip(".")
     if not state:  # a connection that was refused
         state = next((known for words, known in REFUSED_CONNECTIONS.items() if words in why), "")
     code = next((SENTENCES[begin] for begin in (state, state[:2]) if begin in SENTENCES), "")

@@ -109,7 +109,7 @@ class Forwarder:
             self._fail(error)
         except LogError as error:
             self._fail(LogError(say("forward_store", why=error.text)))
-        if time.monotonic() >= self._measure_at:
+        if time.monotonic() >= self._measure_at or (self.status.connected and not self._is_behind):
             self._measure()
 
     @property

@@ -53,9 +53,13 @@ def test_a_server_sends_what_it_keeps(centre: Cluster, tmp_path: Path) -> None:
         health = query(centre, "SELECT up_s, memory_bytes, cpu_s FROM operator_panel.health LIMIT 1")[0]
         assert 0 < health[0] < 600
         assert 50_000_000 < health[1] < 1_000_000_000
-        assert health[2] > 0.5
+        assert health[2] > 0.1
         assert not has_secret(cell)
     assert all(finding.is_note for finding in findings(centre))
+
+
+def state_of_alarm(cell: Server) -> str:
+    return str(listed(cell).get("panel_forward", {}).get("state", ""))
 
 
 def has_secret(cell: Server) -> bool:
@@ -79,7 +83,8 @@ def test_a_lost_database_is_an_alarm_and_delays_no_press(centre: Cluster, tmp_pa
         until(lambda: forward(cell)["connected"], "connected", 60)
         centre.stop()
         try:
-            until(lambda: "panel_forward" in listed(cell), "the alarm is raised", 60)
+            until(lambda: not forward(cell)["connected"], "the loss is known", 60)
+            until(lambda: state_of_alarm(cell) == "active", "the alarm is raised", 60)
             cause = listed(cell)["panel_forward"]["cause"]
             assert f"{NOTHING_SENT} 127.0.0.1:{centre.port}" in cause
             about = forward(cell)
@@ -91,7 +96,7 @@ def test_a_lost_database_is_an_alarm_and_delays_no_press(centre: Cluster, tmp_pa
         finally:
             centre.start()
         until(lambda: forward(cell)["connected"], "connected again", 60)
-        until(lambda: listed(cell)["panel_forward"]["state"] == "returned", "the alarm returned", 60)
+        until(lambda: state_of_alarm(cell) == "returned", "the alarm returned", 60)
 
 
 def test_wrong_settings_stop_the_start_with_a_sentence(tmp_path: Path) -> None:
