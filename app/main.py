@@ -13,7 +13,7 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from fastapi import APIRouter, FastAPI
 from uvicorn import Config as ServerConfig
@@ -28,11 +28,11 @@ from app.panel.checks.look import page_parts
 from app.panel.widgets.kinds import KINDS
 from app.system import log as ros_logging
 from app.system.concurrency import keep_running, spawn_logged
-from app.system.errors import KioskError, PanelError
+from app.system.errors import KioskError, PanelError, SettingsError
 from app.system.log import RepeatedRecords
 from app.system.process import listen_sockets
 from app.system.process.service import ServiceManager, Watchdog
-from app.system.process.shutdown import graceful_shutdown
+from app.system.process.shutdown import Restart, graceful_shutdown
 from app.system.settings import PACKAGE, Settings, shipped_path
 from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
@@ -52,6 +52,9 @@ from app.web.server import (
 )
 from app.web.session_end import follow_users
 
+if TYPE_CHECKING:
+    from app.records.sent_panel import SentPanels
+
 log = logging.getLogger("kiosk")
 
 READ_TIMEOUT_S: Final = 1.0  # for browsers to read their responses at shutdown
@@ -63,9 +66,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     settings = settings or Settings.from_environment()
     ros_logging.configure_logging(settings.log_level)
     repeated = limit_server_log(settings.log_level == "debug")
-    panel = load_panel(settings.panel)
-    check_zenoh(settings, panel)
-    app = new_application(settings, panel.embed, partial(_lifespan, settings, panel, repeated))
+    sent = _sent_panels(settings)
+    try:
+        panel = load_panel(settings.panel)
+        check_zenoh(settings, panel)
+    except Exception as error:
+        if sent is None or not sent.failed(str(error)):
+            raise
+        panel = load_panel(settings.panel)
+        check_zenoh(settings, panel)
+    lifespan = partial(_lifespan_of_sent, sent, settings, panel, repeated)
+    app = new_application(settings, panel.embed, lifespan)
     if settings.dev:
         _add_gallery(app)
     return app
@@ -81,12 +92,56 @@ def _add_gallery(app: FastAPI) -> None:
     app.state.path_methods.add(router.routes)
 
 
+def _sent_panels(settings: Settings) -> "SentPanels | None":
+    """The panels that were sent to this server, after a look at the last one; None where none
+    are taken. Imported only there."""
+    if not settings.take_panel:
+        return None
+    from app.records.sent_panel import SentPanels
+
+    sent = SentPanels(settings.panel)
+    try:
+        sent.begin_start()
+    except OSError as error:
+        log.critical("the panel file that was sent is not taken back: %s", error)
+    return sent
+
+
+@asynccontextmanager
+async def _lifespan_of_sent(
+    sent: "SentPanels | None",
+    settings: Settings,
+    panel: Panel,
+    repeated: RepeatedRecords,
+    app: FastAPI,
+) -> AsyncIterator[None]:
+    """`_lifespan`, after which the server starts again if a panel file was sent, or without the file
+    that it could not start with."""
+    restart, has_started = Restart(ServiceManager().is_enabled), False
+    try:
+        async with _lifespan(settings, panel, repeated, restart, app):
+            has_started = True
+            yield
+    except Exception as error:
+        if has_started and not restart.is_due:
+            raise
+        if not has_started and (sent is None or not sent.failed(str(error))):
+            raise
+        log.exception("the server ended with an error around a panel file that was sent")
+        restart.is_due = True
+    if sent is not None:
+        sent.ended_in_order()
+    restart.finish()
+    if not has_started:
+        raise SettingsError("the panel file that was sent was taken back: start the server again")
+
+
 @asynccontextmanager
 async def _lifespan(
-    settings: Settings, panel: Panel, repeated: RepeatedRecords, app: FastAPI
+    settings: Settings, panel: Panel, repeated: RepeatedRecords, restart: Restart, app: FastAPI
 ) -> AsyncIterator[None]:
     """From the start of the server to its end."""
-    async with _app_state(settings, panel, app.state.server) as state:
+    async with _app_state(settings, panel, app.state.server, restart) as state:
         app.state.app_state = state
         follow_users(state)
         ports: set[int] = set()
@@ -102,6 +157,9 @@ async def _lifespan(
                 keep_running(watchdog.run, log, "the watchdog failed"),
                 keep_running(state.access.watch, log, "watching the users' file failed"),
             ]
+            if state.receiver is not None:
+                trial = state.receiver.follow_trial(state.in_flight)
+                tasks.append(spawn_logged(trial, log, "following a sent panel file failed"))
             gc.collect()
             gc.freeze()  # nor of the panel: with 10,000 alarms it would stop it for 70 to 240 ms
             try:
@@ -128,7 +186,7 @@ async def _end(state: AppState, watchdog: Watchdog, ports: set[int]) -> None:
 
 @asynccontextmanager
 async def _app_state(
-    settings: Settings, panel: Panel, server: ServerConfig | None
+    settings: Settings, panel: Panel, server: ServerConfig | None, restart: Restart
 ) -> AsyncIterator[AppState]:
     """Opens everything that requests need, and closes it at the end."""
     settings = replace(settings, root_path=root_path_of(settings, server))
@@ -152,8 +210,16 @@ async def _app_state(
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
             await access.reload()
             fleet.alarms.watch_sign_ins(access)
+            state = AppState(fleet, assets, made, metrics, oplog, limits, doctor, access)
+            if settings.take_panel:
+                from app.cell.session.sent_panels import PanelReceiver
+
+                receiver = PanelReceiver(
+                    settings.panel, fleet, oplog, restart.begin, is_dev=settings.dev
+                )
+                state.receiver = receiver
             try:
-                yield AppState(fleet, assets, made, metrics, oplog, limits, doctor, access)
+                yield state
             finally:
                 access.close()
                 await doctor.stop()

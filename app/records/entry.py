@@ -31,6 +31,7 @@ Kind = Literal[
     "recipe",
     "place",
     "access",
+    "panel",
     "removed",
     "resumed",
 ]

@@ -38,6 +38,7 @@ VARIABLES = (
     "SYSLOG_CA",
     "FORWARD",
     "WITHOUT",
+    "TAKE_PANEL",
 )
 PROTECTIONS = ("tls", "users")  # that a server which listens beyond loopback has
 
@@ -77,6 +78,7 @@ class Settings:
     syslog_ca: Path | None = None
     forward: Path | None = None
     without: Annotated[tuple[str, ...], PUBLIC] = ()
+    take_panel: Annotated[bool, PUBLIC] = False
 
     def data_folder(self, mode: Mode) -> Path:
         """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's, and a
@@ -112,6 +114,7 @@ class Settings:
             syslog_ca=_parse_path(env, "KIOSK_SYSLOG_CA", None),
             forward=_parse_path(env, "KIOSK_FORWARD", None),
             without=tuple(_parse_without(env.get("KIOSK_WITHOUT", ""))),
+            take_panel=env.get("KIOSK_TAKE_PANEL", "") not in ("", "0"),
         )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Depends, Path
 from starlette.requests import HTTPConnection
@@ -27,6 +27,9 @@ from app.web.downloads import SharedRecordings
 from app.web.metrics import Metrics, PageTrips
 from app.web.pages.page_templates import PageTemplates
 
+if TYPE_CHECKING:
+    from app.cell.session.sent_panels import PanelReceiver
+
 FORMS_KEPT: Final = 64
 
 
@@ -46,7 +49,8 @@ EMPTY_FORM: Final = RefusedForm("", {})
 @dataclass(slots=True)
 class AppState:
     """The state that requests need. `description` is that of all paths, as JSON and packed, if it was
-    requested."""
+    requested. `receiver` takes panel files that engineers send, None where the settings do not permit
+    it."""
 
     fleet: Fleet
     assets: Assets
@@ -61,6 +65,7 @@ class AppState:
     in_flight: InFlight = field(default_factory=InFlight)
     shared: SharedRecordings = field(default_factory=SharedRecordings)
     description: BuiltOnce[tuple[bytes, bytes]] | None = None
+    receiver: "PanelReceiver | None" = None
     # The newest of each client, by the ids of the client and of the user.
     refused_forms: BoundedDict[tuple[str, str], RefusedForm] = field(
         default_factory=lambda: BoundedDict[tuple[str, str], RefusedForm](FORMS_KEPT)

@@ -64,6 +64,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/recipes/{set}/{act}": ANYBODY,
     "/recipes/{set}/import": ANYBODY,
     "/places/{widget}/{act}": ANYBODY,
+    "/panel/take": ANYBODY,
     # What has been, and what the robot is asked.
     "/widgets/{widget}/read": OPERATOR,
     "/alarms/history": OPERATOR,
@@ -87,6 +88,9 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/diagnostics": MAINTENANCE,
     "/diagnostics/look": MAINTENANCE,
     "/recordings/last.mcap": MAINTENANCE,
+    "/panel": ENGINEER,
+    "/panel/check": ENGINEER,
+    "/panel/file": ENGINEER,
     "/users": ENGINEER,
     "/users/{act}": ENGINEER,
     # In development only.

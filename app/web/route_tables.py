@@ -42,6 +42,7 @@ LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "log": ("audit_log",),
     "log.csv": ("audit_log",),
     "display": ("display",),
+    "panel": ("panel_file",),
     "openapi.json": ("description",),
 }
 DESCRIPTION: Final = "openapi.json"  # it describes all

@@ -52,6 +52,11 @@ ABOUT: Final = {
         "your own.",
         "none",
     ),
+    "TAKE_PANEL": (
+        "`1`: an engineer may send another panel file ([Send to a kiosk]"
+        "(../how-to/edit-in-the-browser.md#send-to-a-kiosk)).",
+        "off",
+    ),
     "DEV": (
         "`1` for development: a page shows a fault of the panel file, pages reload on each save, and "
         "in a checkout `/gallery` shows each widget in each state.",

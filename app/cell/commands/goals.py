@@ -428,6 +428,11 @@ class GoalTracker:
 
         return WaypointTracker(self._interfaces, self._robot, self._is_own, self._status_set)
 
+    @property
+    def has_running(self) -> bool:
+        """Whether the end of a goal is not known yet."""
+        return bool(self._results.goals)
+
     def register(self, handlers: SampleHandlers, actions: Iterable[str]) -> None:
         """Handles the feedback and status of these actions from now on."""
         for action in actions:

@@ -432,6 +432,11 @@ class HoldController:
             self.end(holding, code)
         self._schedule()
 
+    @property
+    def has_active(self) -> bool:
+        """Whether a hold is under way."""
+        return bool(self._held)
+
     def close(self) -> None:
         """Ends all holds and refuses new ones from now on."""
         self._closed = True

@@ -73,6 +73,10 @@ class PressGuard:
         """Refuses every command from now on."""
         self._ended = True
 
+    def reopen(self) -> None:
+        """Permits commands again: the server does not end after all."""
+        self._ended = False
+
     def receive(self, press: Press[Command]) -> None:
         """Accepts a press or hold that has arrived: its client is present. InputError for an invalid
         `seen`."""

@@ -3,7 +3,10 @@
 import asyncio
 import faulthandler
 import logging
+import multiprocessing
+import os
 import signal
+import sys
 import threading
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -43,6 +46,31 @@ def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: ShutdownCallback) ->
     finally:
         for number, listener in listened.items():
             signal.signal(number, listener)
+
+
+class Restart:
+    """Starts this server again when it has ended in order: the service manager does, or this process
+    becomes a new one of the same command line."""
+
+    def __init__(self, has_manager: bool) -> None:
+        self._has_manager = has_manager
+        self.is_due = False
+
+    def begin(self) -> None:
+        """Ends the server as SIGTERM does."""
+        self.is_due = True
+        signal.raise_signal(signal.SIGTERM)
+
+    def finish(self) -> None:
+        """Call it when everything is closed. Does not return if this process becomes a new one."""
+        if not self.is_due or self._has_manager:
+            return
+        if multiprocessing.parent_process() is not None:
+            log.error("this server can't start again by itself: its parent process does not start it")
+            return
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os.execv(sys.executable, sys.orig_argv)
 
 
 class _ShutdownSequence:

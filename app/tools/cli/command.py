@@ -46,6 +46,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "run": Command("serve a panel to browsers", "run"),
     "check": Command("check panel files: every fault with its place", "check"),
     "edit": Command("edit a panel file in the browser", "edit"),
+    "send": Command("send a panel file to a kiosk", "send"),
     "log": Command(
         "check the operator's log; print its key, or the panel that was shown at a time", "log"
     ),

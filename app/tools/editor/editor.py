@@ -15,6 +15,7 @@ from app.tools.editor.paths import tag_of
 from app.tools.editor.preview import Preview
 from app.tools.editor.repairs import Repair
 from app.tools.editor.robot_list import RobotList
+from app.tools.editor.sending import Sending
 from app.tools.editor.session import EditSession, SaveConflict
 from app.tools.editor.starting import empty_text
 from app.tools.scaffold.parts import label_of
@@ -50,6 +51,8 @@ class Editor:
         self._numbers = 0
         self._begun = ""  # the text of a new file
         self._is_gone = False  # whether the file was removed
+        self._sendings: dict[str, Sending] = {}  # by who sends
+        self._sending_steps = 0
         preview.on_live = self.notify
 
     @property
@@ -154,6 +157,21 @@ class Editor:
         checked = self.checked
         return self._checker.repairs(self.document, checked.faults or checked.notes)
 
+    def sending(self, person: str) -> Sending:
+        """What a person sends to a kiosk, with their token."""
+        known = self._sendings.get(person)
+        if known is None:
+            known = self._sendings[person] = Sending(self.session.path, self._sending_changed)
+        return known
+
+    def _sending_changed(self) -> None:
+        self._sending_steps += 1
+        self.notify()
+
+    def close(self) -> None:
+        for sending in self._sendings.values():
+            sending.close()
+
     def notify(self) -> None:
         """Tells all browsers."""
         for browser in self.browsers.values():
@@ -187,6 +205,7 @@ class Editor:
             "gone": self._is_gone,
             "recovered": session.recovered is not None,
             "warning": session.journal_problem,
+            "sending": self._sending_steps,
             "others": [
                 {
                     "number": other.number,
@@ -207,6 +226,7 @@ class PartRequest:
     path: Path
     language: str
     query: Mapping[str, str]
+    person: str = ""  # who is signed in
 
 
 # Name of a pane → (template, context) of its fragment.

@@ -31,6 +31,7 @@ from app.tools.editor.paths import (
 )
 from app.tools.editor.places import page_of, places_on
 from app.tools.editor.repairs import Repair
+from app.tools.editor.send_page import send_pane
 from app.tools.editor.start import start_pane
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
@@ -75,6 +76,7 @@ WORDS: Final = {
     "fill_place": say("editor_fill_place"),
     "curve": say("editor_curve"),
     "write_again": say("editor_write_again"),
+    "send": say("send_title"),
 }
 
 
@@ -338,4 +340,5 @@ PARTS: Final[Mapping[str, Part]] = {
     "parts": parts_pane,
     "pick": pick_pane,
     "start": start_pane,
+    "send": send_pane,
 }

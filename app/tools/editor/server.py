@@ -32,6 +32,7 @@ from app.tools.editor.pasting import paste
 from app.tools.editor.paths import path_of
 from app.tools.editor.preview import ROOT as PREVIEW
 from app.tools.editor.preview import Preview
+from app.tools.editor.sending import Destination
 from app.tools.editor.session import EditSession
 from app.tools.editor.start import Start, started
 from app.tools.robot.link import Place
@@ -46,6 +47,7 @@ log = logging.getLogger("kiosk.editor")
 COOKIE: Final = "panel_editor"
 CONFLICT: Final = 409
 TOKEN: Final = "token"  # in the query of the printed address
+PERSON: Final = "editor.person"  # in the scope
 LANGUAGES: Final = ("en", "ja", "de")
 BEAT_S: Final = 15.0
 MOST_BROWSERS: Final = 20
@@ -135,6 +137,7 @@ def editor_app(
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            editor.close()
             session.close()
             await preview.stop()
 
@@ -208,6 +211,11 @@ def language_of(request: Request) -> str:
     """The language of the editor's own sentences."""
     editor: Editor = request.app.state.editor
     return editor.language or _negotiated(request.headers.get("accept-language", ""))
+
+
+def person_of(request: Request) -> str:
+    """Who is signed in; "" on this machine, where no one needs to be."""
+    return str(request.scope.get(PERSON, ""))
 
 
 async def _on_error(request: Request, error: Exception) -> Response:
@@ -340,6 +348,16 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
         answer = {"revision": change.revision, "drawn": editor.preview.number}
         return _json(request, answer | {"select": change.select, "page": page})
 
+    @app.post("/send/compare")
+    async def compare(to: Destination, request: Request, editor: CurrentEditor) -> Response:
+        await editor.sending(person_of(request)).compare(to, language_of(request))
+        return _json(request, {})
+
+    @app.post("/send/take")
+    async def take(request: Request, editor: CurrentEditor) -> Response:
+        await editor.sending(person_of(request)).send()
+        return _json(request, {})
+
     @app.get("/places")
     async def places(request: Request, editor: CurrentEditor, page: str = "") -> Response:
         return _json(request, place_list(editor, page))
@@ -353,7 +371,8 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
         if name not in PARTS:
             raise NotFound(f'there is no pane "{name}"')
         query, language = dict(request.query_params), language_of(request)
-        wanted = PartRequest(editor, path_of(query.get("path", "")), language, query)
+        path, person = path_of(query.get("path", "")), person_of(request)
+        wanted = PartRequest(editor, path, language, query, person)
         template, context = PARTS[name](wanted)
         html = request.app.state.templates.render(f"editor/{template}", language, **context)
         return HTMLResponse(html, headers=NOT_KEPT)

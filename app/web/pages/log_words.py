@@ -12,6 +12,7 @@ from app.cell.commands.acts import Act
 from app.cell.commands.alarm_acts import ALARM_ACTS
 from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.panel_acts import PANEL_ACTS
 from app.cell.commands.place_acts import PLACE_ACTS
 from app.cell.commands.recipe_acts import RECIPE_ACTS
 from app.cell.commands.shift_acts import SHIFT_ACTS
@@ -28,11 +29,14 @@ TABLES: Final[Sequence[tuple[Kind, Mapping[str, Act[Any, Any]]]]] = (
     ("diagnostics", DIAGNOSTIC_ACTS),
     ("recipe", RECIPE_ACTS),
     ("place", PLACE_ACTS),
+    ("panel", PANEL_ACTS),
 )
 # Acts, and changes of control without an act, by the action of their entries.
 ACTION_WORDS: Final = {
     **{f"{kind}_{name}": act.word for kind, acts in TABLES for name, act in acts.items()},
     **{action: word for action, _, word in HAND_OVERS.values()},
+    "panel_kept": "log_page_panel_kept",
+    "panel_restored": "log_page_panel_restored",
 }
 OUTCOME_WORDS: Final = {
     "published": "log_outcome_published",
@@ -52,6 +56,7 @@ OUTCOME_WORDS: Final = {
     "recipe": "log_outcome_recipe",
     "place": "log_outcome_place",
     "access": "log_outcome_access",
+    "panel": "log_outcome_panel",
     "began": "log_outcome_began",
     "changed": "log_outcome_changed",
     "signed": "log_outcome_signed",

@@ -1,5 +1,6 @@
 """The page of diagnostics, the same as JSON, a live look into a topic, and the acts of the page."""
 
+import asyncio
 import sys
 import time
 from collections.abc import Mapping
@@ -301,8 +302,21 @@ async def _page(
         "mqtt": state.fleet.alarms.mqtt,
         "forward": state.fleet.forward.status if state.fleet.forward else None,
         "shared": _shared(request, state, query.robot),
+        "sent_panel": await _sent_panel(state),
     }
     return framed_page(request, state, page, {**context, **TEXTS, **more})
+
+
+async def _sent_panel(state: AppState) -> tuple[str, TextLike] | None:
+    """The mark and the text of the panel file that was sent last; None without one."""
+    if state.receiver is None:
+        return None
+    from app.cell.session.sent_panels import outcome_text
+
+    receiver = state.receiver
+    take = await asyncio.to_thread(lambda: receiver.last)
+    marks = {"kept": "ok", "restored": "problem"}
+    return (marks.get(take.phase, "unknown"), outcome_text(take)) if take is not None else None
 
 
 def _shared(request: Request, state: AppState, robot: str) -> SharedLinks | None:

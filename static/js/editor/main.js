@@ -8,6 +8,7 @@ import * as outline from "./outline.js";
 import * as panes from "./panes.js";
 import * as preview from "./preview.js";
 import { select } from "./selection.js";
+import * as sending from "./send.js";
 import * as starting from "./start.js";
 import { edit, onMessage, onState, open, step } from "./wire.js";
 
@@ -141,4 +142,5 @@ curve.start();
 merge.start();
 adding.start();
 starting.start();
+sending.start();
 open();

@@ -16,6 +16,7 @@
  * @property {number} conflicts With the file on the disk.
  * @property {boolean} gone Whether the file was removed.
  * @property {boolean} recovered Whether there is work that was not saved.
+ * @property {number} sending Counts what has changed in what is sent to a kiosk.
  * @property {string} warning
  * @property {OtherBrowser[]} others
  */
@@ -45,6 +46,7 @@ export let state = {
   gone: false,
   recovered: false,
   warning: "",
+  sending: 0,
   others: [],
 };
 
@@ -177,6 +179,12 @@ export function start(choice) {
 /** @param {"undo" | "redo" | "save"} name @param {Record<string, unknown>} [body] */
 export function step(name, body) {
   return inTurn(() => post(`/${name}`, body));
+}
+
+// Compares with a kiosk, or sends to it. What comes of it is in the pane "send".
+/** @param {"/send/compare" | "/send/take"} path @param {Record<string, unknown>} body */
+export function sendTo(path, body) {
+  return post(path, body);
 }
 
 /** @param {Path | null} path */
