@@ -35,6 +35,7 @@ class CellData:
         self._signer = Signer(folder)
 
     def close(self) -> None:
+        self._log.complete()
         self._log.close()
 
     def press(self, count: int, step_s: float = 1.0) -> None:

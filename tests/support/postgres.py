@@ -41,7 +41,9 @@ def as_server(words: Sequence[str]) -> list[str]:
 class Cluster:
     """A cluster, from `start` to `end`; `admin` is the connection of its superuser."""
 
-    def __init__(self) -> None:
+    def __init__(self, nice: int = 0) -> None:
+        """`nice` lowers its priority, as if it were on another machine."""
+        self._nice = nice
         # Not below the folder of pytest, which is root's alone.
         self.folder = Path(mkdtemp(prefix="operator-panel-pg-", dir="/tmp"))
         if os.geteuid() == 0:
@@ -77,7 +79,8 @@ class Cluster:
         words += [word for name, value in settings.items() for word in ("-c", f"{name}={value}")]
         words += [word for option in options for word in ("-c", option)]
         with open(self.folder / "log", "ab") as log:
-            self._process = subprocess.Popen(as_server(words), stdout=log, stderr=log)
+            words = ["nice", "-n", str(self._nice), *as_server(words)]
+            self._process = subprocess.Popen(words, stdout=log, stderr=log)
         until(self.answers, "PostgreSQL takes connections", 30)
 
     def answers(self) -> bool:
@@ -146,8 +149,8 @@ def send_signal(pid: int, number: signal.Signals) -> None:
 
 
 @contextmanager
-def cluster() -> Iterator[Cluster]:
-    made = Cluster()
+def cluster(nice: int = 0) -> Iterator[Cluster]:
+    made = Cluster(nice)
     (made.folder / "cell-password").write_text(f"{PASSWORD}\n")
     (made.folder / "cell-password").chmod(0o600)
     try:

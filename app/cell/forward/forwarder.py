@@ -37,6 +37,7 @@ SETTLE_S: Final = 1.0  # by then, what was there is on the disk
 HEALTH_EVERY_S: Final = 60.0
 REMOVE_EVERY_S: Final = 600.0
 SLOW_S: Final = 5.0  # a commit that takes longer is told
+LONGEST_REST_S: Final = 1.0
 ALIVE_S: Final = 10.0  # at least so often the status is told
 MOST_SLICES: Final = 20  # batches of one stream before the others have their turn
 REMOVED: Final = "removed in the cell before it was sent"
@@ -58,15 +59,22 @@ class Forwarder:
     """The forwarding of one data folder. `now` is in seconds since the epoch."""
 
     def __init__(
-        self, config: ForwardConfig, folder: Path, now: Callable[[], float] = time.time, server: int = 0
+        self,
+        config: ForwardConfig,
+        folder: Path,
+        now: Callable[[], float] = time.time,
+        server: int = 0,
+        rests: bool = False,
     ) -> None:
-        """`server` is the process whose health is sent, 0 for none. LogError if another process sends
-        for this folder."""
+        """`server` is the process whose health is sent, 0 for none. `rests`: after each batch for as
+        long as it took, so that a long backlog takes no more than half of a core from presses.
+        LogError if another process sends for this folder."""
         self.status = ForwardStatus(address=config.connection.address)
         self._config = config
         self._folder = folder
         self._now = now
         self._server = server
+        self._rests = rests
         self._fd = _lock(folder)
         self._spool: Spool | None = None
         self._centre: Centre | None = None
@@ -198,6 +206,8 @@ class Forwarder:
         for _ in range(MOST_SLICES):
             if until <= sending.cursor.seq or not self._send_batch(centre, spool, sending, until):
                 return
+            if self._rests:
+                time.sleep(min(self.status.took_s, LONGEST_REST_S))
         self._is_behind = True
 
     def _resumed(self, centre: Centre, spool: Spool, stream: Stream) -> _Sending | None:
@@ -362,7 +372,7 @@ def _lock(folder: Path) -> int:
 def run(settings: str, folder: str, server: int) -> Iterator[str]:
     """Forwards for ever; yields the status as JSON when it has changed, and now and then. KioskError if
     it can't begin."""
-    forwarder = Forwarder(read_forward(Path(settings)), Path(folder), server=server)
+    forwarder = Forwarder(read_forward(Path(settings)), Path(folder), server=server, rests=True)
     told, told_at = "", 0.0
     try:
         while True:
