@@ -53,7 +53,11 @@ from app.web.server import (
 from app.web.session_end import follow_users
 
 if TYPE_CHECKING:
+    from app.cell.session.fleet import Fleet
+    from app.cell.site.wall import Wall
+    from app.records import NullLog, OperatorLog
     from app.records.sent_panel import SentPanels
+    from app.system.used_certificates import ServedCertificate
 
 log = logging.getLogger("kiosk")
 
@@ -66,14 +70,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     settings = settings or Settings.from_environment()
     ros_logging.configure_logging(settings.log_level)
     repeated = limit_server_log(settings.log_level == "debug")
-    sent = _sent_panels(settings)
+    sent = _sent_panels(settings) if settings.wall is None else None
+    file = settings.panel if settings.wall is None else shipped_path("wall.toml")
     try:
-        panel = load_panel(settings.panel)
+        panel = load_panel(file)
         check_zenoh(settings, panel)
     except Exception as error:
         if sent is None or not sent.failed(str(error)):
             raise
-        panel = load_panel(settings.panel)
+        panel = load_panel(file)
         check_zenoh(settings, panel)
     lifespan = partial(_lifespan_of_sent, sent, settings, panel, repeated)
     app = new_application(settings, panel.embed, lifespan)
@@ -175,6 +180,8 @@ async def _end(state: AppState, watchdog: Watchdog, ports: set[int]) -> None:
     """Ends the sessions and the log, and waits for outstanding responses."""
     watchdog.notify_stopping()
     try:
+        if state.wall is not None:
+            state.wall.close()
         state.fleet.close()
         state.log.close()
         await state.in_flight.drained(RESPONSE_TIMEOUT_S)
@@ -201,17 +208,20 @@ async def _app_state(
         doctor = _doctor(settings, server)
         async with (
             served_certificate(server) as tls,
-            open_fleet(settings, panel, revision, oplog, in_process, doctor, tls) as fleet,
+            _open_robots(settings, panel, revision, oplog, doctor, tls) as (fleet, wall),
         ):
             metrics = Metrics(
-                fleet, lambda: oplog.left_out, lambda: limits.refused, lambda: oplog.uncopied
+                fleet if wall is None else None,
+                lambda: oplog.left_out,
+                lambda: limits.refused,
+                lambda: oplog.uncopied,
             )
             made = PageTemplates(shipped_path("templates"), page_parts(panel), shipped_path(COMPILED))
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
             await access.reload()
             fleet.alarms.watch_sign_ins(access)
-            state = AppState(fleet, assets, made, metrics, oplog, limits, doctor, access)
-            if settings.take_panel:
+            state = AppState(fleet, assets, made, metrics, oplog, limits, doctor, access, wall)
+            if settings.take_panel and wall is None:
                 from app.cell.session.sent_panels import PanelReceiver
 
                 receiver = PanelReceiver(
@@ -223,6 +233,28 @@ async def _app_state(
             finally:
                 access.close()
                 await doctor.stop()
+
+
+@asynccontextmanager
+async def _open_robots(
+    settings: Settings,
+    panel: Panel,
+    revision: str,
+    oplog: "OperatorLog | NullLog",
+    doctor: DoctorProcess,
+    certificate: "ServedCertificate | None",
+) -> AsyncIterator[tuple["Fleet", "Wall | None"]]:
+    """The robots of a panel; of a wall its cells, with a fleet that reaches no robot."""
+    if settings.wall is None:
+        async with open_fleet(
+            settings, panel, revision, oplog, in_process, doctor, certificate
+        ) as fleet:
+            yield fleet, None
+        return
+    from app.web.wall import open_wall
+
+    async with open_wall(settings, panel, revision, oplog, doctor) as opened:
+        yield opened
 
 
 def _check_protected(settings: Settings, panel: Panel, server: ServerConfig | None) -> None:
@@ -248,8 +280,8 @@ def _watchdog(state: AppState) -> Watchdog:
     """The watchdog of all robot sessions."""
     return Watchdog(
         ServiceManager(),
-        lambda: [(session.robot.name, session.link) for session in state.fleet.sessions],
-        lambda: state.fleet.state,
+        lambda: [(s.robot.name, s.link) for s in state.fleet.sessions if state.wall is None],
+        lambda: state.fleet.state if state.wall is None else state.wall.state,
     )
 
 

@@ -34,6 +34,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("stops",),
         ("history",),
         ("forward",),
+        ("site",),
         ("session",),
     ),
     "tools": (
@@ -60,6 +61,7 @@ SPEAK_ZENOH = {
     "app.ros.zenoh.session",
     "app.ros.zenoh.answers",
     "app.ros.zenoh.config",
+    "app.ros.zenoh.site",
     "app.tools.simulator.zenoh",
 }
 # The dialect and the peer of each kind of robot, and who else may know them.

@@ -39,6 +39,7 @@ from app.panel.rules import (
     LogRules,
     RecordRules,
     ScreenRules,
+    SiteRules,
     StateRules,
 )
 from app.panel.shared_keys import NumberKeys, NumberOrTimeFormat
@@ -191,6 +192,7 @@ class PanelKeys(Description):
     access: AccessRules = AccessRules()
     embed: EmbedRules = EmbedRules()
     record: RecordRules | None = None
+    site: SiteRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()
     diagnostics: DiagnosticRules = DiagnosticRules()

@@ -136,6 +136,11 @@ class Panel(PanelKeys):
         yield from self.recipe_loads
         yield from (robot.figure for robot in self.robots if robot.figure)
 
+    @property
+    def site_cell(self) -> str:
+        """The cell's name in its site."""
+        return (self.site and self.site.cell) or str(self.title)
+
     @cached_property
     def recipe_loads(self) -> tuple[RecipeLoad, ...]:
         """The commands that load a recipe, of each set; they are on the page of recipes."""

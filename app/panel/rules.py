@@ -1,6 +1,7 @@
 """The tables `[access]`, `[access.oidc]`, `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]`,
-`[record]`, `[screen]` and `[state]` of a panel file."""
+`[record]`, `[screen]`, `[site]` and `[state]` of a panel file."""
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Final, Literal, Self
@@ -8,7 +9,18 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Id, Label, Note, Seconds, SecretFile, SecretVariable, TopicName
+from app.panel.base import (
+    Description,
+    Endpoint,
+    Id,
+    Label,
+    Note,
+    Seconds,
+    SecretFile,
+    SecretVariable,
+    TopicName,
+    each_once,
+)
 from app.panel.checks.types import value_faults
 from app.panel.constants import parent_type
 from app.panel.roles import ENGINEER, ROLES
@@ -22,6 +34,7 @@ from app.panel.widgets.displays import (
 )
 from app.panel.widgets.families import CheckContext, Display, TopicField, TopicSource
 from app.ros.messages import Interfaces
+from app.ros.messages.validation import format_value
 from app.system.errors import Fault
 from app.system.texts import say
 
@@ -150,6 +163,40 @@ class RecordRules(Description):
     after_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
     max_mb: Annotated[float, Field(ge=16, le=1_000_000, allow_inf_nan=False)] = 512.0
     topics: Annotated[tuple[TopicName, ...] | None, Field(strict=False)] = None
+
+
+# The table `[site]` of a panel file: what the cell tells of itself to walls, over Zenoh.
+
+# A part of a key expression: none of Zenoh's own signs, and no spaces at its ends.
+CHUNK: Final = r"^[^\s/*$?#@]([^/*$?#\x00-\x1f\x7f]{0,62}[^\s/*$?#])?$"
+
+
+def _check_chunk(name: str) -> str:
+    if not re.fullmatch(CHUNK, name):
+        raise ValueError(
+            f"{format_value(name)} can't be a part of a key expression of Zenoh: 64 characters at most,"
+            " none of / * $ ? #, no @ first, and no space at its ends"
+        )
+    return name
+
+
+Chunk = Annotated[str, AfterValidator(_check_chunk)]
+WALL_URL: Final = r"^https?://[A-Za-z0-9._:\[\]-]+([/?#][!-~]*)?$"
+MAX_FIGURES: Final = 4
+
+
+class SiteRules(Description):
+    """The cell is `cell` of the site `name` (default: the panel's title). `url` is where browsers reach
+    its panel, `figures` are the ids of readouts, `connect` the Zenoh endpoints of the plant's
+    routers."""
+
+    name: Chunk
+    cell: Chunk | None = None
+    url: Annotated[str, Field(pattern=WALL_URL, max_length=300)] | None = None
+    figures: Annotated[
+        tuple[Id, ...], Field(strict=False, max_length=MAX_FIGURES), AfterValidator(each_once)
+    ] = ()
+    connect: Annotated[tuple[Endpoint, ...], Field(strict=False, max_length=8)] = ()
 
 
 # The table `[screen]` of a panel file: how the touch screen behaves between presses.

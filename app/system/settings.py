@@ -20,6 +20,8 @@ LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
 ROOT_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)*")
 HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
 SYSLOG = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::([0-9]{1,5}))?")
+ALL_SITES = "*"
+SITE = re.compile(r"[^\s/*$?#@,]([^/*$?#\x00-\x1f\x7f,]{0,62}[^\s/*$?#,])?")
 SYSLOG_PORT = 6514  # RFC 5425
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 PREFIX = "KIOSK_"
@@ -39,6 +41,7 @@ VARIABLES = (
     "FORWARD",
     "WITHOUT",
     "TAKE_PANEL",
+    "WALL",
 )
 PROTECTIONS = ("tls", "users")  # that a server which listens beyond loopback has
 
@@ -79,12 +82,15 @@ class Settings:
     forward: Path | None = None
     without: Annotated[tuple[str, ...], PUBLIC] = ()
     take_panel: Annotated[bool, PUBLIC] = False
+    wall: tuple[str, ...] | None = None  # the sites of a wall, empty for all; None: a panel
 
     def data_folder(self, mode: Mode) -> Path:
         """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's, and a
         shipped example one apart from other demos."""
         if self.data is not None:
             return self.data
+        if self.wall is not None:
+            return state_home() / APP / "wall"
         if mode != "demo":
             return state_home() / APP
         examples = {shipped_path(file).resolve(): name for name, file in SHIPPED_PANELS.items()}
@@ -115,6 +121,7 @@ class Settings:
             forward=_parse_path(env, "KIOSK_FORWARD", None),
             without=tuple(_parse_without(env.get("KIOSK_WITHOUT", ""))),
             take_panel=env.get("KIOSK_TAKE_PANEL", "") not in ("", "0"),
+            wall=_parse_wall(env.get("KIOSK_WALL", "")),
         )
 
 
@@ -189,6 +196,19 @@ def _parse_without(text: str) -> Iterator[str]:
                 " between"
             )
         yield protection
+
+
+def _parse_wall(text: str) -> tuple[str, ...] | None:
+    sites = tuple(filter(None, (part.strip() for part in text.split(","))))
+    if ALL_SITES in sites:
+        return ()
+    for site in sites:
+        if not SITE.fullmatch(site):
+            raise SettingsError(
+                f'KIOSK_WALL has "{site}": the names of sites with commas between, as `[site]` of a'
+                f' panel file has them, or "{ALL_SITES}" for all'
+            )
+    return sites or None
 
 
 def _parse_syslog(text: str) -> tuple[str, int] | None:

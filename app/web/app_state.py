@@ -29,6 +29,7 @@ from app.web.pages.page_templates import PageTemplates
 
 if TYPE_CHECKING:
     from app.cell.session.sent_panels import PanelReceiver
+    from app.cell.site.wall import Wall
 
 FORMS_KEPT: Final = 64
 
@@ -50,7 +51,7 @@ EMPTY_FORM: Final = RefusedForm("", {})
 class AppState:
     """The state that requests need. `description` is that of all paths, as JSON and packed, if it was
     requested. `receiver` takes panel files that engineers send, None where the settings do not permit
-    it."""
+    it. `wall` has the cells of a wall, whose fleet has no robot; None for a panel."""
 
     fleet: Fleet
     assets: Assets
@@ -60,6 +61,7 @@ class AppState:
     limits: PressLimits
     doctor: DoctorProcess
     access: Access
+    wall: "Wall | None" = None
     clients: Clients = field(default_factory=Clients)
     page_trips: PageTrips = field(default_factory=PageTrips)
     in_flight: InFlight = field(default_factory=InFlight)

@@ -49,7 +49,7 @@ def new_application(
         dependencies=[Depends(method_guard), Depends(route_guard)],
     )
     _add_middleware(app, settings, embed)
-    add_routes(app)
+    add_routes(app, settings.wall is not None)
     return app
 
 

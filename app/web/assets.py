@@ -36,11 +36,12 @@ SHARED: Final = ("entries", "marks", "facts", "alarm-rows")  # by several kinds 
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
 OWN_PAGES: Final = (
     "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "stops", "diagnostics", "recipes",
-    "help", "overview", "signin", "users", "confirm",
+    "help", "overview", "signin", "users", "confirm", "wall",
 )  # fmt: skip
 # What stylesheets of pages have in common, by the page: it comes before its own.
 COMMON: Final = {
     "signin": ("forms", "pad"), "users": ("forms",), "recipes": ("forms",), "confirm": ("pad",),
+    "wall": ("priorities",),
 }  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
 EDITOR: Final = "editor"  # the folder of its scripts, style and templates, which no panel has

@@ -99,6 +99,10 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
 }
 
 
+# The routes that only a wall has.
+OF_WALL: Final[Mapping[str, str]] = {"/wall/events": ANYBODY}
+
+
 async def route_guard(connection: HTTPConnection) -> None:
     """RoleNeeded for a client without what the route needs, or that does not see the widget of the
     path. A route that is not in the table needs an engineer."""
@@ -110,7 +114,7 @@ def check_route(connection: HTTPConnection, route: str) -> None:
     """RoleNeeded as by `route_guard`, for the template of a path."""
     state = site_of(connection)
     path = route.removeprefix(ROBOT) or "/"
-    need = ROUTE_NEEDS.get(path, ENGINEER)
+    need = ROUTE_NEEDS.get(path, OF_WALL.get(path, ENGINEER))
     widget = connection.path_params.get("widget", "")
     if not need and not widget:
         return

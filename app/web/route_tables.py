@@ -21,6 +21,9 @@ from app.web.route_needs import ROBOT
 
 # The modules of `app.web.routes`.
 FIRST: Final = ("pages", "events", "static", "health")
+# Those of a wall: no path of it reaches a robot.
+FIRST_OF_WALL: Final = ("wall", "events", "static", "health")
+LATE_OF_WALL: Final = frozenset({"help", "session", "signin", "users", "log", "log.csv", "display"})
 # The others, by the first segment of their paths.
 LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "widgets": (
@@ -60,15 +63,16 @@ class Routes:
     """The routes of an application, added module by module. FastAPI builds those of a router when the
     first request comes to it."""
 
-    def __init__(self, app: FastAPI) -> None:
+    def __init__(self, app: FastAPI, is_wall: bool = False) -> None:
         self.methods = PathMethods()
         self._app = app
         self._added: set[str] = set()
-        self._add(FIRST)
+        self._late = {k: v for k, v in LATE.items() if not is_wall or k in LATE_OF_WALL}
+        self._add(FIRST_OF_WALL if is_wall else FIRST)
 
     async def load(self, segment: str) -> None:
         """Adds the routes whose paths begin with this segment; all of them, if it describes them."""
-        names = all_modules() if segment == DESCRIPTION else LATE.get(segment, ())
+        names = all_modules() if segment == DESCRIPTION in self._late else self._late.get(segment, ())
         for name in names:
             if name not in self._added:
                 await asyncio.to_thread(_module, name)
@@ -91,9 +95,9 @@ class Routes:
                 self.methods.add(router.routes, ROBOT)
 
 
-def add_routes(app: FastAPI) -> None:
+def add_routes(app: FastAPI, is_wall: bool = False) -> None:
     """The routes of a first page; the others come by `LateRoutes`."""
-    routes = app.state.routes = Routes(app)
+    routes = app.state.routes = Routes(app, is_wall)
     app.state.path_methods = routes.methods
 
 

@@ -57,6 +57,11 @@ ABOUT: Final = {
         "(../how-to/edit-in-the-browser.md#send-to-a-kiosk)).",
         "off",
     ),
+    "WALL": (
+        "The sites of a [wall](../how-to/wall.md), with commas between, or `*` for all. The server "
+        "is then one of a wall, and reads no panel file; `operator-panel wall` sets it.",
+        "none: a panel",
+    ),
     "DEV": (
         "`1` for development: a page shows a fault of the panel file, pages reload on each save, and "
         "in a checkout `/gallery` shows each widget in each state.",

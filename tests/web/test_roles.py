@@ -14,7 +14,7 @@ from fastapi.routing import APIRoute, APIWebSocketRoute
 
 import app.web.routes
 from app.panel.roles import ANYBODY, ROLES
-from app.web.route_needs import LOCAL_ONLY, ROUTE_NEEDS
+from app.web.route_needs import LOCAL_ONLY, OF_WALL, ROUTE_NEEDS
 from tests.support.parts import ROOT, Server, events_in, until
 from tests.support.servers import ready
 from tests.support.users import Browsers, add_user, token_of
@@ -221,7 +221,7 @@ def routes() -> Iterator[APIRoute | APIWebSocketRoute]:
 
 
 def test_every_route_has_a_row() -> None:
-    assert {route.path for route in routes()} == set(ROUTE_NEEDS)
+    assert {route.path for route in routes()} == {*ROUTE_NEEDS, *OF_WALL}
 
 
 FILLED: Final = {

@@ -15,7 +15,7 @@ IMPORT: Final = re.compile(
 )
 COMMENT: Final = re.compile(r"^\s*//.*$|/\*\*[^*]*\*/", re.MULTILINE)
 # Named by a template, or in the page itself.
-ENTRIES: Final = {"main", "guard", "print", "gallery", "editor/main"}
+ENTRIES: Final = {"main", "guard", "print", "gallery", "wall", "editor/main"}
 
 
 def imports() -> Mapping[str, frozenset[str]]:

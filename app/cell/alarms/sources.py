@@ -158,6 +158,7 @@ OwnAlarm = Literal[
     "panel_certificate",
     "panel_mqtt",
     "panel_forward",
+    "panel_site",
     "panel_users",
     "panel_sign_in",
     "panel_alarms_lost",
@@ -170,6 +171,7 @@ PRIORITIES: Final[dict[OwnAlarm, int]] = {
     "panel_certificate": 2,
     "panel_mqtt": 3,
     "panel_forward": 3,
+    "panel_site": 3,
     "panel_users": 2,
     "panel_sign_in": 2,
     "panel_alarms_lost": 2,
@@ -178,6 +180,8 @@ PRIORITIES: Final[dict[OwnAlarm, int]] = {
 UNKEPT: Final = frozenset({"panel_log", "panel_disk"})
 JUMP_S: Final = 5.0  # a smaller step of the clock is not raised
 CERTIFICATE_DAYS: Final = 30  # before its end, a certificate raises the alarm
+ROUTER_WITHIN_S: Final = 30.0  # without a router for the cell's summary, the alarm is raised
+SHOWN_TWIN: Final = 200  # characters
 BROKER_WITHIN_S: Final = 30.0  # without a connection to the broker, the alarm is raised
 FORWARDS_WITHIN_S: Final = 300.0  # without a connection to the central database, the alarm is raised
 SHOWN_ADDRESSES: Final = 3
@@ -262,6 +266,19 @@ def forward_entry(address: str, why: TextLike, lost_s: float) -> AlarmEntry:
     cause = say("own_forward_lost", address=address, within=within, why=why)
     texts = OwnTexts(say("own_forward"), cause, say("own_forward_kept"), say("own_forward_action"))
     return _entry("panel_forward", lost_s >= FORWARDS_WITHIN_S, texts)
+
+
+def site_entry(name: str, twin: str, lost_s: float) -> AlarmEntry:
+    """Of the cell's summary: `twin` is another panel that publishes with its name, "" for none. No
+    router was reached for `lost_s` seconds."""
+    within = number(f"{ROUTER_WITHIN_S:g}", "s")
+    cause = say("own_site_lost", within=within)
+    title, action = say("own_site"), say("own_site_action")
+    if twin:
+        cause = say("own_site_twin", name=name, other=one_line(twin, SHOWN_TWIN))
+        title, action = say("own_site_names"), say("own_site_rename")
+    texts = OwnTexts(title, cause, say("own_site_unseen"), action)
+    return _entry("panel_site", bool(twin) or lost_s >= ROUTER_WITHIN_S, texts)
 
 
 def users_entry(fault: TextLike) -> AlarmEntry:

@@ -44,6 +44,7 @@ from app.cell.alarms.sources import (
     lost_entry,
     own_definitions,
     sign_in_entry,
+    site_entry,
     unreadable_records,
     unused_certificate_entry,
     users_entry,
@@ -119,6 +120,16 @@ class Forwarding(Protocol):
     def status(self) -> ForwardStatus: ...
 
 
+class Site(Protocol):
+    """What the cell publishes of itself: `twin` is another panel with its name, "" for none."""
+
+    name: str
+    twin: str
+
+    @property
+    def is_connected(self) -> bool: ...
+
+
 class OwnAlarms:
     """The panel's own alarms, from `start` to `stop`. Used on the event loop only."""
 
@@ -151,6 +162,8 @@ class OwnAlarms:
         self._checks = 0
         self._broker: Broker | None = None
         self._sign_ins: SignIns | None = None
+        self._site: Site | None = None
+        self._site_connected_at = 0.0  # the last time, in monotonic seconds
         self._connected_at = 0.0  # the last time, in monotonic seconds
         self._timer: asyncio.TimerHandle | None = None
         self._measuring: asyncio.Task[None] | None = None
@@ -166,6 +179,7 @@ class OwnAlarms:
         self._forwarded_at = time.monotonic()
         if self._forwarding is None:
             self._set("panel_forward", forward_entry("", "", 0.0))
+        self._set("panel_site", site_entry("", "", 0.0))
         if not self._certificates.all_files:
             self._set("panel_certificate", certificate_entry("", FAR, datetime.now(UTC)))
         self._check_log()
@@ -177,6 +191,16 @@ class OwnAlarms:
         self._sign_ins = sign_ins
         self._check_sign_ins(sign_ins)
         self._evaluate()
+
+    def watch_site(self, site: Site) -> None:
+        """Looks at this summary from now on."""
+        self._site, self._site_connected_at = site, time.monotonic()
+
+    def _check_site(self, site: Site) -> None:
+        now = time.monotonic()
+        if site.is_connected:
+            self._site_connected_at = now
+        self._set("panel_site", site_entry(site.name, site.twin, now - self._site_connected_at))
 
     def _check_sign_ins(self, sign_ins: SignIns) -> None:
         self._set("panel_users", users_entry(sign_ins.fault))
@@ -227,6 +251,8 @@ class OwnAlarms:
         self._check_forwarding()
         if self._sign_ins is not None:
             self._check_sign_ins(self._sign_ins)
+        if self._site is not None:
+            self._check_site(self._site)
         self._check_lost()
         self._set("panel_alarms_full", full_entry(self._engine.room.left_out))
         if self._checks % DISK_EVERY == 0 and self._measuring is None:
@@ -391,6 +417,11 @@ class Alarms:
         """Raises the panel's own alarms of its users and of their sign-ins."""
         if self._own is not None:
             self._own.watch_sign_ins(sign_ins)
+
+    def watch_site(self, site: Site) -> None:
+        """Raises the panel's own alarm of its summary."""
+        if self._own is not None:
+            self._own.watch_site(site)
 
     async def stop(self) -> None:
         """Evaluates no longer, and writes what is queued."""

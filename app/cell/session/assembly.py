@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
     from app.cell.history.trends import TrendWriter
     from app.cell.session.forward_process import ForwardProcess
+    from app.cell.session.site import SiteSummary
 
 log = logging.getLogger("kiosk")
 
@@ -108,6 +109,7 @@ async def open_fleet(
         )
         trends = _trend_disk(settings, panel, fleet)
         fleet.states = settings.data_folder(mode_of(settings, panel)) / STATES
+        site = _site_summary(settings, panel, fleet)
         states = StateRecorder(fleet.states, fleet.sessions) if panel.state else None
         fleet.forward = _forward(settings, panel)
         try:
@@ -127,6 +129,9 @@ async def open_fleet(
                 fleet.journal.start(fleet.states)
             if fleet.forward is not None:
                 fleet.forward.start()
+            if site is not None:
+                site.start()
+                fleet.alarms.watch_site(site)
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
@@ -134,6 +139,8 @@ async def open_fleet(
         finally:
             if fleet.forward is not None:
                 await fleet.forward.stop()
+            if site is not None:
+                await site.stop()
             if states is not None:
                 await states.stop()
             await fleet.stop()
@@ -180,3 +187,13 @@ def _trend_disk(settings: Settings, panel: Panel, fleet: Fleet) -> "TrendWriter 
     for session in fleet.sessions:
         disk.add(session.entry.id if session.entry else "", session.robot, session.show)
     return disk
+
+
+def _site_summary(settings: Settings, panel: Panel, fleet: Fleet) -> "SiteSummary | None":
+    """What the cell publishes of itself, of a demo too: it says that it is one."""
+    if panel.site is None:
+        return None
+    from app.cell.session.site import SiteSummary
+
+    config = config_from(settings.zenoh, panel.site.connect)
+    return SiteSummary(fleet, panel.site, config, mode_of(settings, panel) == "demo")

@@ -102,6 +102,11 @@ class Renewal:
         """Retries until a session is open that was not lost in the meantime."""
         while self._lost and not self._stopped:
             self._lost = False
+            # Before the thread: a link that came up by now would be lost with the session, and the
+            # new one be renewed for that again.
+            self._link.forget()
+            if self._robot.link_up:
+                self._robot.mark_link_lost()
             try:
                 await asyncio.to_thread(self._link.renew)
             except Exception as error:  # any error of Zenoh: without a session everything stays locked

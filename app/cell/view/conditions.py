@@ -278,15 +278,15 @@ def machine_state(display: MachineState, robot: RobotState, now: float) -> tuple
     with a `state` replaces what the robot says.
     """
     details, changes = _details(display, robot, now)
+    age_s = state_s(display, robot, now)
+    since, until = ("", math.inf) if age_s is None else _for_s(age_s, now)
     if (alarmed := robot.alarmed.state) is not None:
         text, shape, colour = lamp_of(display.states, alarmed.value)
-        since, until = _for_s(now - alarmed.since, now)
         shown = {"state": "live", "text": text, "shape": shape, "colour": colour, "note": ""}
         why = _why(display, alarmed.value)
         return {**shown, "since": since, "why": why, **details}, min(until, changes)
     field = field_state(display, robot, now)
     text, shape, colour = lamp_of(display.states, field.value, robot.texts)
-    since, until = _since(display, robot, now)
     if field.state != "live":
         text, shape, colour = say(LAMP_WORDS[field.state]), SHAPES[field.state], "none"
         since, until = "", math.inf
@@ -300,12 +300,15 @@ def _why(display: MachineState, value: Any) -> TextLike:
     return say("story_title") if any(same_value(value, stop) for stop in display.stops) else ""
 
 
-def _since(display: MachineState, robot: RobotState, now: float) -> tuple[TextLike, float]:
+def state_s(display: MachineState, robot: RobotState, now: float) -> float | None:
+    """For how many seconds the machine has been in its state; None where that was not heard."""
+    if robot.alarmed.state is not None:
+        return now - robot.alarmed.state.since
     reading = robot.reading(display.topic)
     changed = reading.since.get(display.field)
     if changed is None:
-        return "", math.inf
-    return _for_s(max(0.0, reading.wall - changed) + max(0.0, now - reading.at), now)
+        return None
+    return max(0.0, reading.wall - changed) + max(0.0, now - reading.at)
 
 
 def _for_s(age: float, now: float) -> tuple[TextLike, float]:

@@ -1,6 +1,7 @@
 """Checks of a panel file with valid keys and values: those of each widget, and ids, types and topics
 across widgets."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -35,9 +36,10 @@ from app.panel.file.wording import closest_name, known_hint, list_names
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.roles import ROLES
-from app.panel.rules import STATE_ID
+from app.panel.rules import CHUNK, STATE_ID
 from app.panel.template import NOW
 from app.panel.used import used_names
+from app.panel.widgets.displays import Readout
 from app.panel.widgets.families import (
     BaseWidget,
     CheckContext,
@@ -239,6 +241,7 @@ def find_faults(
         *of_widgets,
         *alarm_faults(panel, interfaces, with_faults),
         *stop_faults(panel),
+        *_site_faults(panel, faulty),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
     missed |= (
@@ -409,6 +412,24 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
             hint = known_hint(topic, known)
             message = f"{topic} is no topic that this panel listens to; {hint}"
             yield Fault(f"record.topics[{t}]", message, cause=f"listens {topic}")
+
+
+def _site_faults(panel: Panel, faulty: Collection[str]) -> Iterator[Fault]:
+    """Faults of what the cell tells of itself: its name, and figures that are no readouts."""
+    if panel.site is None:
+        return
+    if not re.fullmatch(CHUNK, panel.site_cell):
+        yield Fault(
+            "site.cell",
+            f'is missing: the title "{panel.site_cell}" has spaces at its ends, over 64 characters or'
+            " one of / * $ ? # @, and can't be the cell's name in Zenoh",
+        )
+    readouts = [widget.id for widget in panel.widgets() if isinstance(widget, Readout)]
+    for f, figure in enumerate(panel.site.figures):
+        if figure not in readouts and figure not in faulty:
+            hint = known_hint(figure, readouts)
+            message = f'"{figure}" is no readout of this panel; {hint}'
+            yield Fault(f"site.figures[{f}]", message, cause=f"input {figure}")
 
 
 def _demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:

@@ -28,6 +28,8 @@ PATTERNS: Final[Mapping[str, str]] = {
     "acr_values": "is not an authentication class: it has no spaces, and 200 characters at most",
     "colour": 'is not a colour: it must be like "#1e5aa8"',
     "origins": 'is not the origin of a site: it must be like "https://intranet.example.com"',
+    "url": 'is not the address of a panel: it must be like "https://cell1.plant.example/"',
+    "figures": NO_ID,
     "screens": 'is not a size of a screen: it must be like "1280x800"',
     "field": "is not a field: it must be like status or pose.position",
     "parameters": "has the name of a parameter with spaces",

@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -201,16 +201,42 @@ def open_session(config: zenoh.Config, as_client: bool) -> tuple[zenoh.Session, 
     connected, a client can be opened in its place.
     """
     with translated("the Zenoh session can't be opened"):
-        if as_client:
+        if as_client or is_client(config):
             try:
-                return zenoh.open(_client(config)), True
+                return open_client(config), True
             except zenoh.ZError:
-                return zenoh.open(config), False
+                return zenoh.open(_waiting(config)), False
         return zenoh.open(config), True
 
 
-def _client(config: zenoh.Config) -> zenoh.Config:
-    """It stamps what it sends, as rmw_zenoh's nodes do: the stamp says whose a message is."""
+def open_client(config: zenoh.Config) -> zenoh.Session:
+    """A client of the first router that answers; ZError if none does. Zenoh itself would wait for the
+    first endpoint until its time is over, and try no other."""
+    endpoints = endpoints_of(config)
+    for first in range(len(endpoints) - 1):
+        with suppress(zenoh.ZError):
+            return zenoh.open(client_config(config, (*endpoints[first:], *endpoints[:first])))
+    return zenoh.open(client_config(config, (*endpoints[-1:], *endpoints[:-1])))
+
+
+def is_client(config: zenoh.Config) -> bool:
+    """Whether a configuration is that of a client: it is connected to one of several routers at a time,
+    and changes over to another when that ends. A peer would be connected to all of them, and get and
+    send everything twice."""
+    return bool(json.loads(config.get_json("mode")) == "client")
+
+
+def _waiting(config: zenoh.Config) -> zenoh.Config:
+    """A peer that connects as a client would, and waits for that."""
+    waiting = zenoh.Config.from_json5(str(config))
+    waiting.insert_json5("mode", '"peer"')
+    waiting.insert_json5("open/return_conditions/connect_scouted", "false")
+    return waiting
+
+
+def client_config(config: zenoh.Config, endpoints: Sequence[str] = ()) -> zenoh.Config:
+    """That of a client, which connects to the first of these endpoints that answers, of its own without
+    any. It stamps what it sends, as rmw_zenoh's nodes do: the stamp says whose a message is."""
     client = zenoh.Config.from_json5(str(config))
     for place, value in {
         "mode": '"client"',
@@ -220,6 +246,8 @@ def _client(config: zenoh.Config) -> zenoh.Config:
         "timestamping/enabled": "true",
     }.items():
         client.insert_json5(place, value)
+    if endpoints:
+        client.insert_json5("connect/endpoints", json.dumps(list(endpoints)))
     return client
 
 
@@ -232,7 +260,7 @@ def tokens_for_clients(config: zenoh.Config, expressions: Collection[str]) -> li
         seen.add(str(sample.key_expr))
 
     try:
-        with zenoh.open(_client(config)) as session:
+        with zenoh.open(client_config(config)) as session:
             declare = session.liveliness().declare_subscriber
             held = [declare(each, Callback(see, indirect=False), history=True) for each in expressions]
             Event().wait(HISTORY_S)  # which a clock that is set does not disturb

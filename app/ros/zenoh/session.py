@@ -199,6 +199,10 @@ class ZenohSession:
         self._inbox.set_topics(declared.immediate, declared.lossless, declared.recorded)
         self._declared = declared
 
+    def forget(self) -> None:
+        """Drops all that this session has received and receives yet."""
+        self._inbox.renew()
+
     def renew(self) -> None:
         """Opens a new session and declares everything; blocks for up to some tenths of a second.
 
@@ -449,3 +453,12 @@ class ZenohSession:
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)
+
+
+class Unconnected(ZenohSession):
+    """A session that is never opened: of a panel that is only drawn, and of a wall, which has no
+    robot."""
+
+    def _open(self) -> None:
+        self.zid, self._is_final = "", True
+        self._tokens = []

@@ -78,48 +78,70 @@ def panel_rules(use: PanelUse) -> list[Rule]:
     ]
 
 
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """Who comes to a router: by their certificates' common names, network interfaces and protocols of
+    the link; everyone without any. `rules` are the ids of what they may do."""
+
+    id: str
+    rules: Sequence[str]
+    keys: Mapping[str, Sequence[str]]
+    comment: str
+
+
 def access_control(
     rules: Sequence[Rule], tls: TlsFiles | None, nodes: Mapping[str, Sequence[str]] | None = None
 ) -> Iterator[str]:
-    """The lines of `access_control`. `nodes` is the subject of the robot's nodes, to which the
-    rule `EVERYTHING` applies; a bridge has none."""
+    """The lines of `access_control` for one panel. `nodes` is the subject of the robot's nodes, to
+    which the rule `EVERYTHING` applies; a bridge has none."""
     mine = [rule for rule in rules if rule.expressions]
     everything = [rule.id for rule in mine if rule.id == EVERYTHING]
+    subjects = []
+    if nodes is not None:
+        comment = "The robot's nodes, by the way on which they come."
+        subjects.append(Subject("nodes", everything, nodes, comment))
+    names = {} if tls is None else {"cert_common_names": [tls.panel]}
+    comment = "Everyone." if tls is None else "Who has the panel's certificate."
+    ids = [rule.id for rule in mine if rule.id != EVERYTHING]
+    yield from access_lines(mine, [*subjects, Subject("panel", ids, names, comment)])
+
+
+def access_lines(rules: Sequence[Rule], subjects: Sequence[Subject]) -> Iterator[str]:
+    """The lines of `access_control`: what is not in the rules of a subject is denied."""
     yield "  access_control: {"
     yield "    enabled: true,"
     yield '    default_permission: "deny",'
     yield "    rules: ["
-    for rule in mine:
+    for rule in rules:
         yield from _rule(rule)
     yield "    ],"
     yield "    subjects: ["
-    if nodes is not None:
-        listed = ", ".join(f"{key}: {json.dumps(list(value))}" for key, value in nodes.items())
-        yield "      // The robot's nodes, by the way on which they come."
-        yield f'      {{ id: "nodes", {listed} }},'
-    if tls is None:
-        yield "      // Everyone."
-        yield '      { id: "panel" },'
-    else:
-        yield "      // Who has the panel's certificate."
-        yield f'      {{ id: "panel", cert_common_names: {json.dumps([tls.panel])} }},'
+    for subject in subjects:
+        keys = {"id": [subject.id], **subject.keys}
+        listed = ", ".join(
+            f"{key}: {json.dumps(value[0] if key == 'id' else list(value))}"
+            for key, value in keys.items()
+        )
+        yield f"      // {subject.comment}"
+        yield f"      {{ {listed} }},"
     yield "    ],"
     yield "    policies: ["
-    if nodes is not None:
-        yield f'      {{ rules: {json.dumps(everything)}, subjects: ["nodes"] }},'
-    ids = json.dumps([rule.id for rule in mine if rule.id != EVERYTHING])
-    yield f'      {{ rules: {ids}, subjects: ["panel"] }},'
+    for subject in subjects:
+        yield f'      {{ rules: {json.dumps(list(subject.rules))}, subjects: ["{subject.id}"] }},'
     yield "    ],"
     yield "  },"
 
 
-def tls_link(tls: TlsFiles, indent: str) -> Iterator[str]:
-    """The lines of `transport.link.tls` of who listens."""
+def tls_link(tls: TlsFiles, indent: str, connect: tuple[Path, Path] | None = None) -> Iterator[str]:
+    """The lines of `transport.link.tls` of who listens; `connect` are the certificate and the key of
+    who connects too."""
+    ends = {"listen": (tls.certificate, tls.key)} | ({"connect": connect} if connect else {})
     yield f"{indent}// Only who has a certificate of this CA gets in."
     yield f"{indent}tls: {{"
     yield f"{indent}  root_ca_certificate: {json.dumps(str(tls.authority))},"
-    yield f"{indent}  listen_certificate: {json.dumps(str(tls.certificate))},"
-    yield f"{indent}  listen_private_key: {json.dumps(str(tls.key))},"
+    for end, (certificate, key) in ends.items():
+        yield f"{indent}  {end}_certificate: {json.dumps(str(certificate))},"
+        yield f"{indent}  {end}_private_key: {json.dumps(str(key))},"
     yield f"{indent}  enable_mtls: true,"
     yield f"{indent}}},"
 

@@ -30,6 +30,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "root_path": "KIOSK_ROOT_PATH",
     "log_level": "KIOSK_LOG_LEVEL",
     "without": "KIOSK_WITHOUT",
+    "wall": "KIOSK_WALL",
 }
 
 

@@ -63,6 +63,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "central": Command("make, verify and prune the plant's central database", "central"),
     "recipes": Command("list, export and import the recipes of a panel", "recipes"),
     "places": Command("list and export the places that operators saved", "places"),
+    "wall": Command("serve a wall: the state of all cells of a plant", "wall"),
     "users": Command("add, change and list users and tokens of programs", "users"),
     "bridge-config": Command("write a configuration of the bridge that fits a panel", "bridge_config"),
     "certificate": Command("make the certificate of the panel's own server", "certificate"),

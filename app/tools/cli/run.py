@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 
@@ -23,7 +24,11 @@ PROG = "python -m app.cli run"
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     parser = make_parser(prog)
-    options = parser.parse_args(arguments)
+    return serve(parser, parser.parse_args(arguments))
+
+
+def serve(parser: Parser, options: Any) -> int:
+    """Serves with these options until it is ended; the exit status."""
     if (options.ssl_certfile is None) != (options.ssl_keyfile is None):
         parser.error("--ssl-certfile and --ssl-keyfile are given together")
     try:
@@ -60,8 +65,14 @@ def make_parser(prog: str) -> Parser:
         description="Serves a panel to browsers.",
         epilog="`uvicorn app.main:app` serves the same, with all of uvicorn's own options.",
     )
-    add = parser.add_argument
     add_settings(parser)
+    add_server(parser)
+    return parser
+
+
+def add_server(parser: Parser) -> None:
+    """Where and how it is served: --host, --port, --name, …"""
+    add = parser.add_argument
     add("--host", default="127.0.0.1", help="address to listen on; default: %(default)s")
     add("--port", default=8000, type=port_to_listen, help="default: %(default)s")
     add(
@@ -95,4 +106,3 @@ def make_parser(prog: str) -> Parser:
     add("--log-level", choices=LOG_LEVELS, help="default: info (KIOSK_LOG_LEVEL)")
     add("--ssl-certfile", type=Path, metavar="FILE", help="for HTTPS: the certificate")
     add("--ssl-keyfile", type=Path, metavar="FILE", help="for HTTPS: its key")
-    return parser

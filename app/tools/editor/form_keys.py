@@ -72,7 +72,7 @@ SECTIONS_BY_TABLE: Final[Mapping[str, tuple[SectionKeys, ...]]] = {
             "form_section_rules",
             (
                 *("interlock", "condition", "alarm", "alarms", "recipe", "access", "control", "log"),
-                *("record", "diagnostics", "embed", "press_expires_s"),
+                *("record", "diagnostics", "embed", "site", "press_expires_s"),
             ),
         ),
         SectionKeys(
@@ -152,7 +152,7 @@ OPENED: Final = frozenset(
     {
         *("page", "group", "frame", "state", "alarm", "alarms", "interlock", "condition", "source"),
         *("recipe", "robot", "place", "zone", "zone_file", "access", "control", "log", "record"),
-        *("diagnostics", "embed", "screen", "brand", "font", "demo", "texts"),
+        *("diagnostics", "embed", "site", "screen", "brand", "font", "demo", "texts"),
     }
 )
 

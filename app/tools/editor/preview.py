@@ -31,7 +31,7 @@ from app.panel.rules import AccessRules, EmbedRules
 from app.panel.widgets.kinds import KINDS
 from app.records import NullLog
 from app.ros.zenoh.config import Config, config_from, config_to
-from app.ros.zenoh.session import ZenohSession
+from app.ros.zenoh.session import Unconnected, ZenohSession
 from app.system.concurrency import keep_running
 from app.system.settings import Settings, shipped_path
 from app.system.texts import render, say
@@ -68,14 +68,6 @@ ONLY_SHOWN: Final = frozenset(
 )
 
 Tables = Mapping[str, Any]
-
-
-class Unconnected(ZenohSession):
-    """A session that is never opened: the sessions of a panel that is only drawn."""
-
-    def _open(self) -> None:
-        self.zid = ""
-        self._tokens = []
 
 
 @dataclass(eq=False)

@@ -64,6 +64,7 @@ REFERENCES: Final[Mapping[str, tuple[Form, tuple[Group, ...]]]] = {
     "alarm.inhibits": ("control", ("widget", "robot")),
     "alarm.ack_command": ("id", ("widget",)),
     "alarm.ack_input": ("id", ("widget",)),
+    "site.figures": ("id", ("widget",)),
     "recipe.fields": ("id", ("widget",)),
     "recipe.parameters": ("keys", ("widget",)),
     "recipe.parameter_types": ("keys", ("widget",)),

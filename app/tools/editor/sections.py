@@ -30,13 +30,14 @@ LISTS: Final[tuple[Keys, ...]] = (
 )  # fmt: skip
 SINGLE: Final[tuple[Keys, ...]] = (
     ("texts",), ("screen",), ("brand",), ("log",), ("diagnostics",), ("control",), ("access",),
-    ("access", "oidc"), ("embed",), ("record",), ("robot", "overview"), ("state",), ("demo",),
-    ("alarms",), ("alarms", "mqtt"), ("frame",), ("recipe", "parameters"), ("recipe", "readback"),
+    ("access", "oidc"), ("embed",), ("site",), ("record",), ("robot", "overview"), ("state",),
+    ("demo",), ("alarms",), ("alarms", "mqtt"), ("frame",), ("recipe", "parameters"),
+    ("recipe", "readback"),
 )  # fmt: skip
 # Of the tables at the top of a new file.
 ORDER: Final = (
     "texts", "font", "screen", "brand", "log", "diagnostics", "control", "access", "embed",
-    "record", "robot", "state", "source", "condition", "interlock", "alarms", "alarm", "place",
+    "site", "record", "robot", "state", "source", "condition", "interlock", "alarms", "alarm", "place",
     "zone", "zone_file", "recipe", "frame", "page", "demo",
 )  # fmt: skip
 

@@ -153,6 +153,7 @@ class PageContext(TypedDict):
     confirms: bool
     frame_keys: Sequence[FrameKey]
     good_outcomes: Collection[str]
+    wall_now: Mapping[str, Any]
 
 
 def page_context(
@@ -211,6 +212,7 @@ def page_context(
         confirms=bool(confirmed_commands(panel, page)),
         frame_keys=[*frame_keys(panel, session.entry.id if session.entry else None, page.id)],
         good_outcomes=GOOD_OUTCOMES,
+        wall_now=_wall_now(state),
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
@@ -249,6 +251,15 @@ def page_context(
         back=back,
         alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
     )
+
+
+def _wall_now(state: AppState) -> Mapping[str, Any]:
+    """What the header of a wall's pages shows of its cells. Imported only there."""
+    if state.wall is None:
+        return {}
+    from app.web.pages.wall import header_of
+
+    return header_of(state.wall)
 
 
 def _faded(receipt: Receipt | None) -> Receipt | None:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
@@ -12,6 +13,9 @@ from app.web.app_state import CurrentState
 from app.web.caller import caller_of
 from app.web.metrics import Metrics
 from app.web.requests import errors
+
+if TYPE_CHECKING:
+    from app.cell.site.wall import Wall
 
 router = APIRouter()
 
@@ -40,6 +44,8 @@ class NotReady(BaseModel):
     },
 )
 async def readyz(request: Request, state: CurrentState) -> Response:
+    if state.wall is not None:
+        return _of_wall(request, state.wall)
     sessions = state.fleet.sessions
     ways = await asyncio.gather(*(session.check_readiness() for session in sessions))
     way = next((way for way in ways if not way.permitted), None)
@@ -49,6 +55,15 @@ async def readyz(request: Request, state: CurrentState) -> Response:
     body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": reason}
     robots = {k.entry.id: w.code for k, w in zip(sessions, ways, strict=True) if k.entry}
     return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
+
+
+def _of_wall(request: Request, wall: "Wall") -> Response:
+    """Whether the wall reaches a router."""
+    if wall.is_connected:
+        return JSONResponse({"status": "ready"})
+    reason = render(wall.state, caller_of(request).language)
+    body = {"status": "not ready", "code": "wall_no_router", "reason": reason}
+    return JSONResponse(body, status_code=503)
 
 
 @router.get(

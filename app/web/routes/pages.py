@@ -56,6 +56,8 @@ OTHER_PAGES = (
     "diagnostics.html",
     "_diagnostics.html",
     "_look.html",
+    "wall.html",
+    "_wall.html",
 )
 
 

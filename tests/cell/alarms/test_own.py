@@ -62,6 +62,7 @@ def test_the_panels_own_alarms_are_of_no_robot_and_never_of_high_priority() -> N
         "panel_certificate",
         "panel_mqtt",
         "panel_forward",
+        "panel_site",
         "panel_users",
         "panel_sign_in",
         "panel_alarms_lost",

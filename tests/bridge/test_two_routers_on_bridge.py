@@ -1,0 +1,153 @@
+"""A panel and the real bridge at two Zenoh routers, of which one is killed: the panel changes over."""
+
+import json
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from tests.support.parts import ROOT, Bridge, RosNode, Server, free_port, until
+from tests.support.rmw import Router
+
+PANEL: Final = """
+title = "Cell"
+interlock = [{ id = "operation", topic = "/operation_enabled", max_age_s = 1.0 }]
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "message"
+kind = "text"
+label = "Message"
+[[page.widget]]
+id = "say"
+kind = "publish"
+label = "Say"
+topic = "/operation"
+type = "std_msgs/msg/String"
+message = { data = "{message}" }
+interlock = "operation"
+"""
+CHANGE_OVER_S: Final = 8.0
+PAUSE_S: Final = 0.05  # between two presses
+
+
+class LinkedRouters:
+    """Two routers that are connected to each other."""
+
+    def __init__(self, folder: Path) -> None:
+        self.routers = [Router(), Router()]
+        for number, router in enumerate(self.routers):
+            other = self.routers[1 - number].endpoint
+            file = folder / f"router{number}.json5"
+            config = {
+                "mode": "router",
+                "listen": {"endpoints": [router.endpoint]},
+                "connect": {"endpoints": [other]},
+                "scouting": {"multicast": {"enabled": False}},
+                "transport": {"link": {"tx": {"lease": 2000}}},
+            }
+            file.write_text(json.dumps(config))
+            router.configure(file)
+
+    @property
+    def endpoints(self) -> list[str]:
+        return [router.endpoint for router in self.routers]
+
+
+@pytest.fixture
+def routers(tmp_path: Path) -> Iterator[LinkedRouters]:
+    mine = LinkedRouters(tmp_path)
+    for router in mine.routers:
+        router.start()
+    yield mine
+    for router in mine.routers:
+        router.end()
+
+
+@pytest.fixture
+def robot(domain: int, routers: LinkedRouters) -> Iterator[RosNode]:
+    """A node behind a bridge that is connected to both routers."""
+    both = json.dumps(routers.endpoints)
+    bridge = Bridge(domain + 2, options=[f"connect/endpoints={both}"])
+    bridge.start()
+    node = RosNode(bridge.domain)
+    node.subscribe("/operation", "std_msgs/msg/String", depth=1000)
+    node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    yield node
+    node.end()
+    bridge.end()
+
+
+@pytest.fixture
+def panel(routers: LinkedRouters, tmp_path: Path) -> Iterator[Server]:
+    file, zenoh = tmp_path / "cell.toml", tmp_path / "zenoh.json5"
+    file.write_text(PANEL)
+    config = {
+        "mode": "client",
+        "connect": {"endpoints": routers.endpoints},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {"link": {"tx": {"lease": 2000, "keep_alive": 4}}},
+    }
+    zenoh.write_text(json.dumps(config))
+    environment = {"KIOSK_PANEL": str(file), "KIOSK_ZENOH": str(zenoh), "KIOSK_MODE": "live"}
+    with Server(ROOT, free_port(), **environment) as mine:
+        yield mine
+
+
+class Presser:
+    """Presses again and again, each time with another text, and keeps the receipts."""
+
+    def __init__(self, server: Server, name: str) -> None:
+        self._server, self._name = server, name
+        self.receipts: dict[str, dict[str, Any]] = {}
+        self.open_at = 0.0  # the first of the newest presses in a row that were published
+
+    def press(self) -> str:
+        """The outcome."""
+        word = f"{self._name}-{len(self.receipts)}"
+        body = {"inputs": {"message": word}, "id": f"press-{word}"}
+        receipt: dict[str, Any] = self._server.http.post("/widgets/say", json=body).json()
+        self.receipts[word] = receipt
+        if receipt["outcome"] != "published":
+            self.open_at = 0.0
+        elif not self.open_at:
+            self.open_at = time.monotonic()
+        return str(receipt["outcome"])
+
+    def words(self, outcome: str) -> set[str]:
+        return {word for word, each in self.receipts.items() if each["outcome"] == outcome}
+
+
+def test_the_panel_changes_over_when_a_router_dies(
+    routers: LinkedRouters, robot: RosNode, panel: Server
+) -> None:
+    robot.every("/operation_enabled", {"data": True}, 0.1)
+    until(lambda: panel.widget("say")["enabled"], "the permission comes through a router")
+    for number, router in enumerate(routers.routers):
+        presser = Presser(panel, f"router{number}")
+        until(lambda each=presser: each.press() == "published", "it is open")  # type: ignore[misc]
+        router.kill()
+        killed_at = time.monotonic()
+        while time.monotonic() - killed_at < CHANGE_OVER_S:
+            presser.press()
+            time.sleep(PAUSE_S)
+        took = max(0.0, presser.open_at - killed_at)
+        refused = {each["code"] for each in presser.receipts.values() if each["outcome"] == "refused"}
+        outcomes = Counter(str(each["outcome"]) for each in presser.receipts.values())
+        print(f"router {number}: open after {took:.2f} s, {dict(outcomes)}, {refused}")
+        assert presser.open_at, "it is open again"
+        until(lambda each=presser: each.words("published") <= said(robot), "all")  # type: ignore[misc]
+        heard = robot.heard_data("/operation")
+        assert len(heard) == len(set(heard)), "no press arrives twice"
+        assert not presser.words("refused") & set(heard), "what was refused was not sent later"
+        assert set(outcomes) <= {"published", "refused", "unknown"}
+        router.start()
+        until(panel.ready, "it is there")
+
+
+def said(robot: RosNode) -> set[str]:
+    return set(robot.heard_data("/operation"))
