@@ -67,15 +67,15 @@ class PressGuard:
         self._publisher_by_id = publisher_by_id
         self._needs = needs
         self._confirm_locks = confirm_locks
-        self._ended = False
+        self._ending = ""  # the code of the lock
 
-    def close(self) -> None:
-        """Refuses every command from now on."""
-        self._ended = True
+    def close(self, code: str = "server_shutting_down") -> None:
+        """Refuses every command from now on, with the first reason that it was closed for."""
+        self._ending = self._ending or code
 
     def reopen(self) -> None:
         """Permits commands again: the server does not end after all."""
-        self._ended = False
+        self._ending = ""
 
     def receive(self, press: Press[Command]) -> None:
         """Accepts a press or hold that has arrived: its client is present. InputError for an invalid
@@ -88,7 +88,7 @@ class PressGuard:
         """The server's own locks for a client: shutdown, log, control, alarms."""
         control, lock = self._control.verdict(who), self._log.lock
         return ServerConditions(
-            control, lock, self._ended, who, self._inhibited(), self._needs, self._confirm_locks
+            control, lock, self._ending, who, self._inhibited(), self._needs, self._confirm_locks
         )
 
     def stale_reason(self, press: Press[Command]) -> TextLike:
@@ -106,8 +106,8 @@ class PressGuard:
 
     def act_verdict(self, at: float | None) -> Verdict:
         """Whether the server permits an operator's act; `at` as in a press."""
-        if self._ended:
-            return locked("server_shutting_down")
+        if self._ending:
+            return locked(self._ending)
         if self._log.lock:
             return Verdict(False, "log", self._log.lock)
         why = "" if at is None else self.late(at)

@@ -43,16 +43,16 @@ from app.system.texts import TextLike
 class ServerConditions:
     """Why the server itself locks a press.
 
-    `ending`: it shuts down. `log_lock`: why the operator's log locks, "" if it does not. `control`:
-    whether the client has control. `who` is None in a question for all clients. `inhibited`: the locks
-    by alarms, by the widgets' ids. `needs`: the roles and groups that a command needs, by its id.
-    `confirm_locks`: why no person can confirm a press. `pressed`: the question is about a press, which
-    a person has `confirmed`, or None.
+    `ending`: the code of the lock while it shuts down or takes over another panel, "" else. `log_lock`:
+    why the operator's log locks, "" if it does not. `control`: whether the client has control. `who` is
+    None in a question for all clients. `inhibited`: the locks by alarms, by the widgets' ids. `needs`:
+    the roles and groups that a command needs, by its id. `confirm_locks`: why no person can confirm a
+    press. `pressed`: the question is about a press, which a person has `confirmed`, or None.
     """
 
     control: Verdict = PERMITTED
     log_lock: TextLike = ""
-    ending: bool = False
+    ending: str = ""
     who: Principal | None = None
     inhibited: Mapping[str, Verdict] = field(default_factory=dict, hash=False)
     needs: Mapping[str, frozenset[str]] = field(default_factory=dict, hash=False)
@@ -109,7 +109,7 @@ def _confirmation(request: PermissionRequest) -> Verdict | None:
 
 
 def _ending(request: PermissionRequest) -> Verdict | None:
-    return locked("server_shutting_down") if request.grounds.ending else None
+    return locked(request.grounds.ending) if request.grounds.ending else None
 
 
 def _log(request: PermissionRequest) -> Verdict | None:
@@ -175,6 +175,7 @@ CAUSES: Final[Mapping[str, Cause]] = {
             "parameter_node_unavailable",
             "service_connecting",
             "server_shutting_down",
+            "panel_being_taken",
         ),
         "link",
     ),

@@ -102,7 +102,7 @@ class PanelReceiver(PanelTaker):
 
     def lock(self) -> None:
         for session in self._fleet.sessions:
-            session.press_guard.close()
+            session.press_guard.close("panel_being_taken")
 
     async def take(self, request: ActRequest) -> Text | None:
         origin, values = origin_of(request.who), request.values

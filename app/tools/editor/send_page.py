@@ -25,7 +25,7 @@ WORDS: Final = {
     "trust_about": say("send_trust_about"),
     "compare": say("send_compare"),
     "send": say("send_button"),
-    "close": say("editor_close"),
+    "close": say("close"),
     "kiosk": say("send_kiosk"),
     "shows": say("send_shows"),
     "control": say("send_control"),
@@ -34,7 +34,7 @@ WORDS: Final = {
     "check": say("send_check"),
     "good": say("editor_no_faults"),
     "files": say("send_files"),
-    "difference": say("editor_diff"),
+    "difference": say("send_difference"),
     "same": say("send_same"),
 }
 

@@ -45,7 +45,7 @@ def buttons(count: int) -> list[dict[str, Any]]:
 @given(
     permitted=some.sampled_from([True, False, None]),
     wrong_type=some.sets(some.integers(0, 4)),
-    ending=some.booleans(),
+    ending=some.sampled_from(["", "server_shutting_down"]),
     log=some.sampled_from(["", "The disk is full."]),
     control=some.sampled_from([PERMITTED, CONTROL]),
     later=some.sampled_from([0.0, 5.0]),
@@ -53,7 +53,7 @@ def buttons(count: int) -> list[dict[str, Any]]:
 def test_verdict_of_grouped_buttons_equals_the_verdict_of_each_alone(
     permitted: bool | None,
     wrong_type: set[int],
-    ending: bool,
+    ending: str,
     log: str,
     control: Verdict,
     later: float,

@@ -67,7 +67,7 @@ def alarm(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_first_that_locks_is_reported() -> None:
-    everything = ServerConditions(locked("control"), "The disk is full.", ending=True)
+    everything = ServerConditions(locked("control"), "The disk is full.", ending="server_shutting_down")
     one_press = question(link=locked("link"), interlocks=[locked("one")], grounds=everything)
     assert permission(one_press).code == "link"
     assert (
@@ -147,6 +147,7 @@ def test_verdicts_of_several_are_reported_in_their_order() -> None:
         ("link_no_bridge", "link"),
         ("service_unavailable", "link"),
         ("server_shutting_down", "link"),
+        ("panel_being_taken", "link"),
         ("log", "log"),
         ("control_held", "interlock"),
         ("interlock_not_permitted", "interlock"),

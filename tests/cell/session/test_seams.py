@@ -28,6 +28,7 @@ from app.records import NullLog
 from app.records.principal import Principal, anonymous
 from app.ros.zenoh.config import config_to
 from app.ros.zenoh.inbox import Changes, Token
+from app.system.texts import say
 from app.tools.simulator.in_process import in_process
 from tests.cell.commands.test_holds import HALF, JOG, POINT, SPEED
 from tests.cell.commands.test_presses import Bench, Way
@@ -341,6 +342,22 @@ def test_ending_session_sends_no_more_messages() -> None:
         who = Principal(anonymous("192.0.2.1"))
         assert not session.press_guard.conditions(who).ending
         await session.stop()
-        assert session.press_guard.conditions(who).ending
+        assert session.press_guard.conditions(who).ending == "server_shutting_down"
 
     asyncio.run(pressed())
+
+
+def test_take_of_a_panel_locks_with_its_own_reason_until_the_end() -> None:
+    async def taken() -> None:
+        session = session_of(small_panel(), "tcp/127.0.0.1:1")
+        guard, who = session.press_guard, Principal(anonymous("192.0.2.1"))
+        for _ in range(2):
+            guard.close("panel_being_taken")
+            assert guard.act_verdict(None).reason == say("panel_being_taken")
+            guard.reopen()
+            assert guard.act_verdict(None).permitted
+        guard.close("panel_being_taken")
+        await session.stop()
+        assert guard.conditions(who).ending == "panel_being_taken"
+
+    asyncio.run(taken())
