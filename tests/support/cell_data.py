@@ -14,7 +14,7 @@ from app.cell.alarms.store import NAME as ALARMS
 from app.cell.alarms.store import AlarmStore
 from app.cell.history.trends import FieldName, TrendFile
 from app.cell.robot.history import Bucket
-from app.records.entry import Entry, new_entry
+from app.records.entry import Entry, Kind, new_entry
 from app.records.log_key import Signer, load_or_make_key
 from app.records.store import Store
 
@@ -38,13 +38,14 @@ class CellData:
         self._log.complete()
         self._log.close()
 
-    def press(self, count: int, step_s: float = 1.0) -> None:
-        """Adds presses, each of them `step_s` after the one before."""
+    def press(self, count: int, step_s: float = 1.0, kind: Kind = "pressed") -> None:
+        """Adds presses, each of them `step_s` after the one before; a server closes those that are
+        `pressed`."""
         entries = []
         for _ in range(count):
             self._count += 1
             entry = new_entry(
-                "pressed",
+                kind,
                 values={"n": self._count},
                 reason="Ok",
                 press=f"{self._count:032x}",

@@ -19,7 +19,7 @@ from app.system.worker import Limits, Worker, Workers
 
 log = logging.getLogger("kiosk.forward")
 
-LIMITS: Final = Limits(memory=400_000_000)
+LIMITS: Final = Limits(memory=400_000_000, nice=19)
 
 
 def _failed(why: TextLike) -> LogError:
