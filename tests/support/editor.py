@@ -81,18 +81,24 @@ field = "data"
 
 
 class EditorServer:
-    """A running editor; `http` is a client that has its token."""
+    """A running editor; `http` is a client that has its token, and has signed in as the `engineer`
+    "name:password". One that listens on all addresses is reached on this machine."""
 
-    def __init__(self, file: Path, *options: str, **environment: str) -> None:
+    def __init__(self, file: Path, *options: str, engineer: str = "", **environment: str) -> None:
         self.file = file
         env = {**os.environ, "XDG_STATE_HOME": str(file.parent / "state"), **environment}
         self.process = command.start(COMMAND, "edit", str(file), "--port", "0", *options, env=env)
         assert self.process.stdout is not None
-        self.address = self.process.stdout.readline().strip()
+        self.address = self.process.stdout.readline().strip().replace("//0.0.0.0:", "//127.0.0.1:")
         assert self.address.startswith("http"), self.process.stderr and self.process.stderr.read()
         self.url = self.address.partition("/?")[0]
-        self.http = httpx.Client(base_url=self.url, timeout=60, headers={"accept-language": "en"})
+        self.http = httpx.Client(
+            base_url=self.url, timeout=60, headers={"accept-language": "en"}, verify=not engineer
+        )
         until(lambda: self.http.get(self.address).status_code == 303, "the editor answers")
+        if engineer:
+            named = dict(zip(("name", "secret"), engineer.split(":"), strict=True))
+            assert self.http.post("/sign-in", data=named).status_code == 303
         until(lambda: self.state()["faults"] or self.state()["live"] > 0, "the preview's sessions run")
 
     def state(self) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 from app.cell.people.access_log import WAITS, WRONG, AccessLog, AccessLogWriter
@@ -303,12 +304,15 @@ class Access:
         oplog: AccessLog,
         monotonic: Callable[[], float] = time.monotonic,
         cost: Cost | None = None,
+        state: Path | None = None,
     ) -> None:
+        """`state` is the folder that keeps which changes of the users are logged; that of the file by
+        default."""
         self.rules = rules
         self.sessions = Sessions(rules.idle_s, monotonic)
         self.delays = SignInDelays(monotonic)
         self.checker = SecretChecker(cost or cost_of_machine(memory_of_machine()), monotonic)
-        self.log = AccessLogWriter(oplog, file.folder)
+        self.log = AccessLogWriter(oplog, state or file.folder)
         self.fault: TextLike = ""
         self.book = UserBook()
         self.file = file

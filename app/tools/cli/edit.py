@@ -41,7 +41,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print(NOT_INSTALLED, file=sys.stderr)
         return 1
     try:
-        _check(options.panel, options.host, options.ssl_certfile is not None)
+        options.users = _checked_users(options)
         settings = Settings.from_environment()
         return _serve(options, settings)
     except (KioskError, OSError) as error:
@@ -49,16 +49,27 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         return 1
 
 
-def _check(path: Path, host: str, has_tls: bool) -> None:
-    """SettingsError if the file can't be edited, or its editor would be open to the network."""
+def _checked_users(options: Namespace) -> Path | None:
+    """The folder of the users who may sign in; None where no one needs to. SettingsError if the file
+    can't be edited, or its editor would be open to the network."""
+    path, host = options.panel, options.host
     if not path.is_file() and (path.exists() or not path.parent.is_dir()):
         raise SettingsError(f"{path}: there is no such file")
-    if _is_loopback(host) or has_tls:
-        return
-    raise SettingsError(
-        f"to listen on {host}, beyond this machine, the editor needs TLS (--ssl-certfile and"
-        " --ssl-keyfile): its address has a secret. Listen on 127.0.0.1, and reach it by ssh -L"
-    )
+    if _is_loopback(host):
+        if options.users is not None:
+            raise SettingsError("--users goes with --host: no one signs in on this machine")
+        return None
+    if options.ssl_certfile is None:
+        raise SettingsError(
+            f"to listen on {host}, beyond this machine, the editor needs TLS (--ssl-certfile and"
+            " --ssl-keyfile): its address has a secret. Listen on 127.0.0.1, and reach it by ssh -L"
+        )
+    from app.tools.editor.session import state_folder
+    from app.tools.editor.signin import USERS, check_engineer
+
+    folder: Path = (options.users or state_folder(path) / USERS).resolve()
+    check_engineer(folder, host)
+    return folder
 
 
 def _is_loopback(host: str) -> bool:
@@ -97,6 +108,7 @@ def _serve(options: Namespace, settings: Settings) -> int:
         port=port,
         is_live=options.live,
         language=options.language or "",
+        users=options.users,
     )
     scheme = "https" if options.ssl_certfile else "http"
     print(f"{scheme}://{name}:{port}/?token={token}", flush=True)
@@ -140,6 +152,8 @@ def make_parser(prog: str) -> Parser:
         help="show the real robot's values (KIOSK_ZENOH), which is only read; default: a simulated one",
     )
     add("--language", choices=LANGUAGES, help="of the editor; default: the browser's")
+    about = "beyond this machine: the folder of the users who sign in; default: one beside the backups"
+    add("--users", type=Path, metavar="FOLDER", help=about)
     add("--ssl-certfile", type=Path, metavar="FILE", help="for HTTPS: the certificate")
     add("--ssl-keyfile", type=Path, metavar="FILE", help="for HTTPS: its key")
     return parser

@@ -153,7 +153,7 @@ class Addition(BaseModel):
     page: str = ""
 
 
-def add(editor: Editor, addition: Addition, language: str) -> Change:
+def add(editor: Editor, addition: Addition, language: str, author: str = "") -> Change:
     """One step of the document; NotFound if the item or its choice is gone."""
     tables = editor.document.tables
     near = path_from(addition.near) if addition.near else ()
@@ -177,15 +177,15 @@ def add(editor: Editor, addition: Addition, language: str) -> Change:
         at = path_from(addition.at) if addition.at else place_near(tables, near, addition.page)
         on = path_from(addition.on) if addition.on else None
         drop = drop_of(choice, tables, at, on if on and _table(editor, on) else None)
-    return _applied(editor, drop, addition)
+    return _applied(editor, drop, addition, author)
 
 
-def _applied(editor: Editor, drop: Drop, addition: Addition) -> Change:
+def _applied(editor: Editor, drop: Drop, addition: Addition, author: str) -> Change:
     """The change by a drop; none where the file has it already."""
     label = addition.kind or addition.key
     if not drop.edits:
         return Change(editor.document.revision, label, (), drop.select)
-    change = editor.apply(map(edit_from, drop.edits), label, addition.revision)
+    change = editor.apply(map(edit_from, drop.edits), label, addition.revision, author)
     return replace(change, select=drop.select)
 
 

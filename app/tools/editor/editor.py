@@ -16,7 +16,7 @@ from app.tools.editor.preview import Preview
 from app.tools.editor.repairs import Repair
 from app.tools.editor.robot_list import RobotList
 from app.tools.editor.sending import Sending
-from app.tools.editor.session import EditSession, SaveConflict
+from app.tools.editor.session import EditSession, SaveConflict, Saved
 from app.tools.editor.starting import empty_text
 from app.tools.scaffold.parts import label_of
 
@@ -29,6 +29,7 @@ class Browser:
 
     number: int
     selection: Path | None = None
+    person: str = ""  # who is signed in there
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
 
@@ -53,6 +54,7 @@ class Editor:
         self._is_gone = False  # whether the file was removed
         self._sendings: dict[str, Sending] = {}  # by who sends
         self._sending_steps = 0
+        self.on_save: Callable[[str, Saved], None] = lambda author, saved: None
         preview.on_live = self.notify
 
     @property
@@ -99,6 +101,7 @@ class Editor:
             saved = self.session.save(recreate=recreate, author=author)
         finally:
             self.notify()
+        self.on_save(author, saved)
         self.changes, self._is_gone = 0, False
         if self.document.revision != revision:
             self.show()
@@ -177,11 +180,11 @@ class Editor:
         for browser in self.browsers.values():
             browser.changed.set()
 
-    def browser(self, name: str) -> Browser:
+    def browser(self, name: str, person: str = "") -> Browser:
         known = self.browsers.get(name)
         if known is None:
             self._numbers += 1
-            known = self.browsers[name] = Browser(self._numbers)
+            known = self.browsers[name] = Browser(self._numbers, person=person)
         return known
 
     def state(self, name: str) -> dict[str, Any]:
@@ -209,6 +212,7 @@ class Editor:
             "others": [
                 {
                     "number": other.number,
+                    "person": other.person,
                     "path": other.selection,
                     "tag": tag_of(document.tables, other.selection),
                 }

@@ -86,7 +86,7 @@ class PageTab(NamedTuple):
     icon: str
 
 
-def page_context(editor: Editor, language: str, revision: str) -> dict[str, Any]:
+def page_context(editor: Editor, language: str, revision: str, person: str) -> dict[str, Any]:
     """The variables of `edit.html`."""
     tables, panel = editor.document.tables, editor.preview.panel
     named = [tables.get("language", "en"), *_strings(tables.get("languages"))]
@@ -95,6 +95,7 @@ def page_context(editor: Editor, language: str, revision: str) -> dict[str, Any]
         languages = [*panel.readers_languages]
     return {
         "revision": revision,
+        "sign_out": say("editor_sign_out", name=person) if person else "",
         "file": editor.session.path.name,
         "sizes": SIZES,
         "languages": [(tag, own_name(tag)) for tag in languages],

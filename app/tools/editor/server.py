@@ -34,6 +34,7 @@ from app.tools.editor.preview import ROOT as PREVIEW
 from app.tools.editor.preview import Preview
 from app.tools.editor.sending import Destination
 from app.tools.editor.session import EditSession
+from app.tools.editor.signin import PERSON, SignIn, SignInGuard, add_sign_in
 from app.tools.editor.start import Start, started
 from app.tools.robot.link import Place
 from app.web.asgi import Application
@@ -47,7 +48,6 @@ log = logging.getLogger("kiosk.editor")
 COOKIE: Final = "panel_editor"
 CONFLICT: Final = 409
 TOKEN: Final = "token"  # in the query of the printed address
-PERSON: Final = "editor.person"  # in the scope
 LANGUAGES: Final = ("en", "ja", "de")
 BEAT_S: Final = 15.0
 MOST_BROWSERS: Final = 20
@@ -116,21 +116,25 @@ def editor_app(
     port: int = 0,
     is_live: bool = False,
     language: str = "",
+    users: FilePath | None = None,
 ) -> FastAPI:
     """The application of the editor of one file. Only browsers with the token, which the address has
-    once, are let in."""
+    once, are let in, and with `users`, the folder of a users' file, only its engineers."""
     preview = Preview(path, settings, is_live)
     session = EditSession(path)
     editor = Editor(session, preview, DocumentChecker(path), language)
+    sign_in = SignIn(users, session.folder, port) if users is not None else None
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         await preview.start()
         editor.begin()
-        tasks = (
+        tasks = [
             keep_running(editor.watch, log, "watching the file failed"),
             keep_running(editor.robots.run, log, "reading the robot failed"),
-        )
+        ]
+        if sign_in is not None:
+            tasks.append(await sign_in.start())
         try:
             yield
         finally:
@@ -139,6 +143,8 @@ def editor_app(
             await asyncio.gather(*tasks, return_exceptions=True)
             editor.close()
             session.close()
+            if sign_in is not None:
+                sign_in.close()
             await preview.stop()
 
     app = Application(
@@ -151,9 +157,13 @@ def editor_app(
     app.state.editor = editor
     app.state.files, app.state.revision = _files()
     app.state.templates = PageTemplates(shipped_path("templates"))
-    _add_routes(app, settings)
+    _add_routes(app, settings, sign_in)
     app.router.routes.append(Mount(PREVIEW, app=preview))
     app.add_exception_handler(KioskError, _on_error)
+    if sign_in is not None:
+        editor.on_save = sign_in.log.saved
+        add_sign_in(app, sign_in, _sign_in_page)
+        app.add_middleware(SignInGuard, sign_in=sign_in, language=language_of)
     app.add_middleware(TokenGuard, token=token, cookie=f"{COOKIE}_{port}")
     app.add_middleware(RequestGuard, hosts=settings.hosts)
     return app
@@ -251,11 +261,20 @@ def _files() -> tuple[Mapping[str, Asset], str]:
     return files, digest.hexdigest()[:12]
 
 
-def _add_routes(app: FastAPI, settings: Settings) -> None:
+def _sign_in_page(request: Request, variables: Mapping[str, Any]) -> str:
+    state = request.app.state
+    about = {"file": state.editor.session.path.name, "revision": state.revision}
+    html: str = state.templates.render(
+        "editor/sign_in.html", language_of(request), **about, **variables
+    )
+    return html
+
+
+def _add_routes(app: FastAPI, settings: Settings, sign_in: SignIn | None) -> None:
     @app.get("/", response_class=HTMLResponse)
     async def page(request: Request, editor: CurrentEditor) -> Response:
         language = language_of(request)
-        context = page_context(editor, language, request.app.state.revision)
+        context = page_context(editor, language, request.app.state.revision, person_of(request))
         html = request.app.state.templates.render("editor/edit.html", language, **context)
         policy = f"{content_security_policy()}; frame-src 'self'"
         return HTMLResponse(html, headers=NOT_KEPT | {POLICY: policy})
@@ -271,16 +290,16 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
 
     @app.get("/events")
     async def events(browser: str, request: Request, editor: CurrentEditor) -> Response:
-        return EditorEvents(editor, browser, language_of(request))
+        return EditorEvents(editor, browser, person_of(request), language_of(request))
 
     @app.get("/state")
     async def state(request: Request, editor: CurrentEditor, browser: str = "") -> Response:
         return _json(request, editor.state(browser))
 
     @app.post("/selection")
-    async def select(selected: Selected, editor: CurrentEditor) -> Response:
+    async def select(selected: Selected, request: Request, editor: CurrentEditor) -> Response:
         known = editor.browsers.get(selected.browser)
-        if known is not None:
+        if known is not None and known.person == person_of(request):
             known.selection = None if selected.path is None else path_from(selected.path)
             editor.notify()
         return Response(status_code=204)
@@ -288,12 +307,17 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
     @app.post("/edits")
     async def edit(posted: Edits, request: Request, editor: CurrentEditor) -> Response:
         edits = [*map(edit_from, posted.edits)]
-        return _step(request, editor, lambda: editor.apply(edits, posted.label, posted.revision))
+        author = person_of(request)
+        return _step(
+            request, editor, lambda: editor.apply(edits, posted.label, posted.revision, author)
+        )
 
     @app.post("/paste")
     async def paste_text(posted: Pasted, request: Request, editor: CurrentEditor) -> Response:
         edit = paste(editor.document.tables, path_from(posted.path), posted.text)
-        return _step(request, editor, lambda: editor.apply([edit], posted.label))
+        return _step(
+            request, editor, lambda: editor.apply([edit], posted.label, author=person_of(request))
+        )
 
     @app.post("/files")
     async def upload(path: str, name: str, request: Request, editor: CurrentEditor) -> Response:
@@ -302,11 +326,15 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
             data += chunk
             if len(data) > uploads.MOST_BYTES:
                 break
-        return _step(request, editor, lambda: uploads.store(editor, path_of(path), name, bytes(data)))
+        author = person_of(request)
+        return _step(
+            request, editor, lambda: uploads.store(editor, path_of(path), name, bytes(data), author)
+        )
 
     @app.post("/add")
     async def add_part(posted: Addition, request: Request, editor: CurrentEditor) -> Response:
-        return _step(request, editor, lambda: add(editor, posted, language_of(request)))
+        language, author = language_of(request), person_of(request)
+        return _step(request, editor, lambda: add(editor, posted, language, author))
 
     @app.get("/robot")
     async def robot_values(request: Request, editor: CurrentEditor) -> Response:
@@ -318,15 +346,15 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
 
     @app.post("/undo")
     async def undo(request: Request, editor: CurrentEditor) -> Response:
-        return _step(request, editor, editor.undo)
+        return _step(request, editor, lambda: editor.undo(person_of(request)))
 
     @app.post("/redo")
     async def redo(request: Request, editor: CurrentEditor) -> Response:
-        return _step(request, editor, editor.redo)
+        return _step(request, editor, lambda: editor.redo(person_of(request)))
 
     @app.post("/save")
     async def save(posted: Saving, request: Request, editor: CurrentEditor) -> Response:
-        problem = editor.save(recreate=posted.recreate)
+        problem = editor.save(person_of(request), recreate=posted.recreate)
         return _json(request, editor.state("") | ({"message": problem} if problem else {}))
 
     @app.post("/resolve")
@@ -338,13 +366,14 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
     @app.post("/recovered")
     async def recovered(choice: Recovery, request: Request, editor: CurrentEditor) -> Response:
         if choice.take:
-            return _step(request, editor, editor.take_recovered)
+            return _step(request, editor, lambda: editor.take_recovered(person_of(request)))
         editor.drop_recovered()
         return _json(request, editor.state(""))
 
     @app.post("/start")
     async def start(posted: Start, request: Request, editor: CurrentEditor) -> Response:
-        change, page = await started(editor, posted, Place(zenoh=settings.zenoh))
+        robot = Place(zenoh=settings.zenoh)
+        change, page = await started(editor, posted, robot, person_of(request))
         answer = {"revision": change.revision, "drawn": editor.preview.number}
         return _json(request, answer | {"select": change.select, "page": page})
 
@@ -355,7 +384,11 @@ def _add_routes(app: FastAPI, settings: Settings) -> None:
 
     @app.post("/send/take")
     async def take(request: Request, editor: CurrentEditor) -> Response:
-        await editor.sending(person_of(request)).send()
+        person = person_of(request)
+        sending = editor.sending(person)
+        if sign_in is not None and sending.can_send:
+            sign_in.log.sent(person, sending.address)
+        await sending.send()
         return _json(request, {})
 
     @app.get("/places")
@@ -389,8 +422,9 @@ class EditorEvents(Response):
 
     media_type = "text/event-stream"
 
-    def __init__(self, editor: Editor, name: str, language: str) -> None:
+    def __init__(self, editor: Editor, name: str, person: str, language: str) -> None:
         self._editor = editor
+        self._person = person
         self._name = name[:64]
         self._language = language
         self.status_code = 200
@@ -404,7 +438,7 @@ class EditorEvents(Response):
             await send({"type": "http.response.body", "body": b"", "more_body": False})
             return
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
-        browser = editor.browser(self._name)
+        browser = editor.browser(self._name, self._person)
         writing = asyncio.get_running_loop().create_task(self._write(browser, send))
         try:
             while (await receive())["type"] != "http.disconnect":

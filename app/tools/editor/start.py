@@ -81,7 +81,7 @@ def start_pane(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     }
 
 
-async def started(editor: Editor, start: Start, robot: Place) -> tuple[Change, str]:
+async def started(editor: Editor, start: Start, robot: Place, author: str = "") -> tuple[Change, str]:
     """What was asked for, as one step, and the id of the page that is new. KioskError, such as that
     there is no robot."""
     edits: list[Edit]
@@ -95,7 +95,7 @@ async def started(editor: Editor, start: Start, robot: Place) -> tuple[Change, s
     else:
         edits = _from_file(editor, start)
     before = [] if editor.is_new else _page_ids(editor.document.tables)
-    change = editor.apply(edits, start.source, start.revision)
+    change = editor.apply(edits, start.source, start.revision, author)
     new = [name for name in _page_ids(editor.document.tables) if name not in before]
     return change, new[-1] if new else ""
 

@@ -21,7 +21,7 @@ PICTURE_KEYS: Final = ("src", "picture", "logo")
 MOST_BYTES: Final = 8_000_000
 
 
-def store(editor: Editor, path: Path, name: str, data: bytes) -> Change:
+def store(editor: Editor, path: Path, name: str, data: bytes, author: str = "") -> Change:
     """Writes a file below the panel file's folder and names it at `path`, as one step. InputError for a
     name that no file of a panel has, for another file of this name, and with the panel's own sentence
     for a file that can't be used there; nothing is changed then."""
@@ -62,7 +62,7 @@ def store(editor: Editor, path: Path, name: str, data: bytes) -> Change:
         if isinstance(error, OSError):
             raise InputError(say("editor_not_saved", why=error.strerror or str(error))) from error
         raise
-    return editor.apply(edits, name)
+    return editor.apply(edits, name, author=author)
 
 
 def _write(file: FilePath, data: bytes) -> None:

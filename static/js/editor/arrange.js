@@ -143,7 +143,7 @@ export function drawRings() {
   for (const ring of overlay.querySelectorAll(".ring:not(.hover), .room")) ring.remove();
   for (const { room, beside } of places) if (room && !beside?.length) addRoom(room);
   for (const { path, message } of faulty) addRing(placeOf(path), message, "faulty");
-  for (const other of state.others) addRing(placeOf(other.path), other.tag, "other");
+  for (const { path, person, tag } of state.others) addRing(placeOf(path), person ? `${person}: ${tag}` : tag, "other");
   const place = places.find(({ path, selector }) => selector === reached && isSame(path, selection()));
   const chosen = place ?? placeOf(selection());
   if (chosen) addRing(chosen, chosen.tag, "chosen");

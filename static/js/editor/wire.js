@@ -1,7 +1,7 @@
 // The editor's server: its state by one event stream, edits one after the other, and the panes as fragments.
 
 /** @typedef {(string | number)[]} Path */
-/** @typedef {{ number: number, path: Path, tag: string }} OtherBrowser */
+/** @typedef {{ number: number, person: string, path: Path, tag: string }} OtherBrowser */
 /**
  * @typedef {object} State
  * @property {number} revision
@@ -27,6 +27,7 @@ const REOPEN_MS = 1000;
 const OK = 200;
 const NOT_OK = 300;
 const BEHIND = 409;
+const SIGNED_OUT = 401;
 const JSON_BODY = { "content-type": "application/json" };
 
 export const browser = crypto.randomUUID();
@@ -87,8 +88,17 @@ export function open() {
   });
   stream.onerror = () => {
     say(document.body.dataset.lost ?? "");
-    if (stream.readyState === EventSource.CLOSED) setTimeout(open, REOPEN_MS);
+    if (stream.readyState !== EventSource.CLOSED) return;
+    get("/state"); // a stream does not say why it was refused
+    setTimeout(open, REOPEN_MS);
   };
+}
+
+// Who is signed out signs in again: the server answers with that page. Nothing is lost, the document is the server's.
+/** @param {Response} response */
+function checkSignedIn(response) {
+  if (response.status === SIGNED_OUT) location.assign("/");
+  return response;
 }
 
 // Edits are posted one after the other, each on what the one before made.
@@ -106,7 +116,7 @@ function inTurn(task) {
 async function send(path, body, headers = JSON_BODY) {
   let response;
   try {
-    response = await fetch(path, { method: "POST", headers, body });
+    response = checkSignedIn(await fetch(path, { method: "POST", headers, body }));
   } catch {
     return { status: 0, answer: { message: document.body.dataset.lost ?? "" } };
   }
@@ -196,7 +206,7 @@ export function tellSelection(path) {
 /** @param {string} path */
 export async function get(path) {
   const response = await fetch(path).catch(() => null);
-  return response?.ok ? response : null;
+  return response && checkSignedIn(response).ok ? response : null;
 }
 
 /** @param {string} name @param {Record<string, string>} query */
