@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # bytes. Blocks.
 
 FOLDER: Final = "kept-files"
+RESTORED: Final = "restored.json"  # of the data folder: by which backup it was restored, and when
 MOST_FILES: Final = 5000
 MOST_BYTES: Final = 256_000_000
 TEMPORARY: Final = ".new"
@@ -472,6 +473,8 @@ class StartRecord:
         values["files"] = sha256(as_json)
         if not values.get(PANEL, "").startswith(self.revision):
             values["panel_loaded"] = self.revision  # the file was changed in the meantime
+        if restored := self._restored():
+            values["restored"] = restored
         old, old_panel = self._last(last_files)
         try:
             not_kept = self.archive.keep({values["files"]: as_json} | dict(start.contents))
@@ -491,6 +494,13 @@ class StartRecord:
         return values, [
             new_entry("changed", values=batch, reason=reason) for batch in in_entries(changed)
         ]
+
+    def _restored(self) -> str:
+        """When this data was restored, and by which backup; "" if it never was."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            about = json.loads((self.archive.folder.parent / RESTORED).read_bytes())
+            return f"{about['at']}, backup of {about['made']}, SHA-256 {about['sha256']}"
+        return ""
 
     def _last(self, last_files: str) -> tuple[Manifest | None, bytes | None]:
         """The manifest and the panel file of the last start, as far as they are kept."""

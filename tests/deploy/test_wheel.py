@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -226,7 +227,9 @@ def test_a_panel_is_served_by_its_command_and_its_data_is_backed_up(machine: Mac
     finally:
         served.end()
     backup = machine.root / "backup/panel"
-    assert (backup / "operators-log.sqlite3").stat().st_size > 0
+    for name in ("cell1.zip", "data.zip"):
+        with zipfile.ZipFile(backup / name) as packed:
+            assert "data/operators-log.sqlite3" in packed.namelist()
     assert (backup / "panel.toml").read_text() == SHIPPED.read_text()
 
 

@@ -95,7 +95,8 @@ def _key(options: Namespace) -> int:
     return 0
 
 
-def _public_key(text: str) -> str:
+def public_key(text: str) -> str:
+    """The type of an argument."""
     from app.records.log_key import parse_public_key
 
     try:
@@ -203,7 +204,7 @@ def make_parser(prog: str) -> Parser:
     check.add_argument(
         "--key",
         action="append",
-        type=_public_key,
+        type=public_key,
         metavar="KEY",
         help="the public key that may sign, as `log key` printed it; may be given several times;"
         " default: the key in the data folder",
