@@ -8,7 +8,8 @@ import pytest
 from tests.support.parts import ROOT
 
 FILES = ("SECURITY.md", "docs/evidence.md")
-PATH = re.compile(r"`(tests/[\w/]+\.py)`")
+PATH = re.compile(r"`(tests/[\w/]+\.py)(?=`|::)")
+NAMED_IN_FILE = re.compile(r"`(tests/[\w/]+\.py)::(test_\w+)`")
 NAME = re.compile(r"`(test_\w+)`")
 
 
@@ -49,3 +50,27 @@ def test_each_threat_has_a_measure_and_a_test() -> None:
         assert threat
         assert measure
         assert PATH.search(test) or NAME.search(test) or test.startswith("the same"), threat
+
+
+def test_each_row_of_the_requirements_names_tests_that_exist() -> None:
+    text = (ROOT / "docs/evidence.md").read_text(encoding="utf-8")
+    named = NAMED_IN_FILE.findall(text)
+    assert len(named) >= 40
+    lacking = [
+        f"{path}::{name}"
+        for path, name in named
+        if f"def {name}(" not in (ROOT / path).read_text(encoding="utf-8")
+    ]
+    assert lacking == []
+
+
+@pytest.mark.parametrize("heading", ["IEC 62443-4-2", "The machine", "EN 301 549"])
+def test_each_row_has_a_state_and_its_evidence_or_a_reason(heading: str) -> None:
+    text = (ROOT / "docs/evidence.md").read_text(encoding="utf-8")
+    part = text.partition(f"\n## {heading}")[2].partition("\n## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")][2:]
+    assert len(rows) >= 9
+    for row in rows:
+        requirement, state, evidence = row
+        assert re.match("met|partly|not met|installation", state), requirement
+        assert PATH.search(evidence) or len(evidence) > 25, requirement
