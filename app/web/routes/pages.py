@@ -57,7 +57,7 @@ OTHER_PAGES = (
     "_diagnostics.html",
     "_look.html",
     "wall.html",
-    "_wall.html",
+    "manual.html",
 )
 
 
