@@ -25,6 +25,34 @@ from app.system.texts import Text, TextLike, joined, number, render, say
 TEMPLATE: Final = "manual.html"
 # What a command does to an endpoint of the robot, by the role of that.
 SENT: Final = {"MS": "manual_publishes", "SS": "manual_calls", "AS": "manual_goal"}
+# The headings of the template.
+WORDS: Final = (
+    "manual_title",
+    "manual_about",
+    "manual_file",
+    "manual_made",
+    "manual_contents",
+    "manual_modes",
+    "manual_states",
+    "manual_interlocks",
+    "manual_conditions",
+    "manual_recipe_sets",
+    "manual_alarms",
+    "manual_is_stop",
+    "manual_sends",
+    "manual_only_while",
+    "manual_locked_by",
+    "manual_shown",
+    "manual_needed",
+    "manual_locked",
+    "lock_to_do",
+    "alarms_priority",
+    "manual_raised",
+    "alarms_cause",
+    "alarms_consequence",
+    "alarms_action",
+    "manual_locks",
+)
 IMAGES: Final = {
     ".svg": "image/svg+xml",
     ".png": "image/png",
@@ -95,6 +123,7 @@ def manual_context(
     """The variables of the template. `digest` is the SHA-256 of the panel file, `now` the time."""
     return {
         "say": say,
+        "words": {code: say(code) for code in WORDS},
         "panel": panel,
         "file": file.name,
         "digest": digest,
