@@ -45,11 +45,15 @@ class LogKey:
         self._private = private
         self.public = base64.b64encode(private.public_key().public_bytes_raw()).decode()
 
+    def signed(self, message: bytes) -> str:
+        """The signature of some bytes, in base64."""
+        return base64.b64encode(self._private.sign(message)).decode()
+
     def entry(self, head: Head, why: Why) -> Entry:
         """The entry that signs the newest one, to be written right after it."""
         entry = new_entry("signed", reason=say("log_signed", seq=head.seq))
         about = Signature(head.seq, head.hash, self.public, "")
-        signature = base64.b64encode(self._private.sign(about.message(entry.at))).decode()
+        signature = self.signed(about.message(entry.at))
         values = about._replace(signature=signature)._asdict() | {"why": why}
         return entry._replace(values=json.dumps(values))
 

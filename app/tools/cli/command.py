@@ -45,6 +45,7 @@ class Command:
 COMMANDS: Final[Mapping[str, Command]] = {
     "run": Command("serve a panel to browsers", "run"),
     "check": Command("check panel files: every fault with its place", "check"),
+    "prove": Command("prove a panel on its simulated robot: each lock, hold and alarm", "prove"),
     "edit": Command("edit a panel file in the browser", "edit"),
     "send": Command("send a panel file to a kiosk", "send"),
     "log": Command(

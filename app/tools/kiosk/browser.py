@@ -308,7 +308,7 @@ class Browser:
         if self._crashed:
             return PageStatus(crashed=True)
         try:
-            seen = await self._evaluate(LOOK)
+            seen = await self.evaluate(LOOK)
         except NoResponse:
             return PageStatus(crashed=True) if self._crashed else PageStatus(responds=False)
         except DevToolsError:  # between two documents; a browser that is gone is seen by its end
@@ -351,7 +351,8 @@ class Browser:
             with suppress(DevToolsError):
                 await self._call("Target.closeTarget", targetId=target)
 
-    async def _evaluate(self, expression: str) -> dict[str, Any]:
+    async def evaluate(self, expression: str) -> dict[str, Any]:
+        """What an expression of the page makes, an object; DevToolsError if it throws."""
         parameters = {"expression": expression, "awaitPromise": True, "returnByValue": True}
         result = await self._call("Runtime.evaluate", session=self._session, **parameters)
         if "exceptionDetails" in result:

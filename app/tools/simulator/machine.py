@@ -69,6 +69,13 @@ def permitting(
     return value
 
 
+def candidates(conditions: Sequence[Condition], kind: str) -> Iterator[Any]:
+    """Values of a field of the base type `kind`, of which each condition is met by some and not met by
+    others, as far as its type has them."""
+    values = (_as_kind(value, kind) for value in _candidates(conditions, kind, (), None))
+    return (value for value in values if _fits(value, kind) or not kind)
+
+
 def satisfies(interlock: Condition, value: Any) -> bool:
     """Whether a value meets all conditions; without any, whether it is true."""
     comparisons = interlock.comparisons

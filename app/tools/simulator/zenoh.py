@@ -348,6 +348,18 @@ class SimulatedZenohRobot:
         """The liveliness tokens of its endpoints."""
         return self._wire.tokens(self._namespace, self._endpoints())
 
+    def publisher_tokens(self, topic: str, type_name: str = "") -> set[str]:
+        """The liveliness tokens of its publisher of a topic, also as if it had another type; none for a
+        topic that it does not publish."""
+        published = self._publishes.get(topic)
+        if published is None:
+            return set()
+        own_hash = "" if type_name else published.type_hash
+        kind = type_name or published.type
+        endpoint = PanelEndpoint("MP", self._key(topic), kind, published.qos, own_hash)
+        of_node = {*self._wire.tokens(self._namespace, [])}
+        return {*self._wire.tokens(self._namespace, [endpoint])} - of_node
+
     def _endpoints(self) -> Iterator[PanelEndpoint]:
         robot, key = self._robot, self._key
         for topic, simulated in robot.subscribes.items():
@@ -424,6 +436,8 @@ class Simulator:
             for namespace, robot in robots.items()
         ]
         bridged = [namespace for namespace, way in way_of.items() if way == BEHIND_A_BRIDGE]
+        self._tokens: dict[str, Any] = {}
+        self._announced: dict[tuple[SimulatedZenohRobot, str], set[str]] = {}  # other than at the start
         self._declared = list(self._graph(bridged))
         self._thread = threading.Thread(target=self._run, name="demo-robot", daemon=True)
 
@@ -450,7 +464,7 @@ class Simulator:
             yield from self._bridge(bridged)
         for played in self.robots:
             for token in played.tokens():
-                yield self._session.liveliness().declare_token(token)
+                self._tokens[token] = self._session.liveliness().declare_token(token)
         for wire in self._wires.values():
             for token in wire.peer_tokens():
                 yield self._session.liveliness().declare_token(token)
@@ -462,6 +476,18 @@ class Simulator:
         config = json.dumps({"namespace": namespace or "/"})
         yield _admin_value(self._session, bridge_dialect.version(zid), DEMO_VERSION)
         yield _admin_value(self._session, bridge_dialect.config(zid), config)
+
+    def announce(self, topic: str, type_name: str = "", *, gone: bool = False) -> None:
+        """The publishers of a topic are announced with another type than their own, or, if `gone`, not
+        at all. Without both they are announced as they are."""
+        for played in self.robots:
+            shown = self._announced.get((played, topic), played.publisher_tokens(topic))
+            wanted = set() if gone else played.publisher_tokens(topic, type_name)
+            self._announced[played, topic] = wanted
+            for token in shown - wanted:
+                self._tokens.pop(token).undeclare()
+            for token in wanted - shown:
+                self._tokens[token] = self._session.liveliness().declare_token(token)
 
     def _run(self) -> None:
         while not self._ends.wait(self._step_s):

@@ -1,0 +1,155 @@
+"""What is proved of a panel: each control in each situation of its interlocks, each alarm, and each way
+to end a hold. Pure, and from the panel file alone: it shares no code with what decides."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+
+from app.panel.alarm import Alarm
+from app.panel.condition import Condition, Interlock
+from app.panel.model import Panel
+from app.panel.widgets.families import Command
+from app.panel.widgets.hold import HoldCommand
+from app.panel.widgets.key_parts import confirmation_of
+
+Situation = Literal[
+    "permits", "forbids", "never_seen", "old", "other_type", "publisher_gone",
+    "link_cut", "no_control", "no_role", "shutdown",
+]  # fmt: skip
+# Those of one interlock, in the order in which they are made.
+OF_INTERLOCK: Final[Sequence[Situation]] = (
+    "never_seen", "permits", "forbids", "old", "other_type", "publisher_gone",
+)  # fmt: skip
+HoldEnd = Literal["released", "page_gone", "no_beat", "forbids", "link_cut"]
+HOLD_ENDS: Final[Sequence[HoldEnd]] = ("released", "page_gone", "no_beat", "forbids")
+Field = tuple[str, str]  # topic, path
+
+
+class Case(NamedTuple):
+    """A control in a situation of the interlock `guard`, "" for a situation of the whole panel."""
+
+    control: str
+    guard: str
+    situation: Situation
+
+
+class AlarmCase(NamedTuple):
+    """An alarm that is raised, shown, acknowledged and returns."""
+
+    alarm: str
+
+
+class HoldCase(NamedTuple):
+    """A hold that ends in a way; `guard` is the interlock that forbids, else ""."""
+
+    control: str
+    end: HoldEnd
+    guard: str = ""
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """A control with the ids of the interlocks that guard it."""
+
+    control: Command
+    guards: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is proved. `rounds` are interlocks that can be examined at the same time: no control has two
+    of a round, and no two of a round are read from one field."""
+
+    controls: Mapping[str, Guarded]
+    interlocks: Mapping[str, Interlock]
+    rounds: Sequence[Sequence[Interlock]]
+    alarms: Sequence[Alarm]
+    left_out: Mapping[str, str]  # control or alarm → why it is not proved
+
+    def cases(self) -> Iterator[Case]:
+        """Each case of a control, once."""
+        for guarded in self.controls.values():
+            name = str(guarded.control.id)
+            for guard in sorted(guarded.guards):
+                for situation in situations(self.interlocks[guard]):
+                    yield Case(name, guard, situation)
+            if not guarded.guards:
+                yield Case(name, "", "permits")
+
+    def holds(self) -> Iterator[HoldCase]:
+        for guarded in self.controls.values():
+            if isinstance(guarded.control, HoldCommand):
+                for end in HOLD_ENDS:
+                    if end != "forbids":
+                        yield HoldCase(str(guarded.control.id), end)
+                for guard in sorted(guarded.guards):
+                    yield HoldCase(str(guarded.control.id), "forbids", guard)
+
+
+def situations(interlock: Interlock) -> Iterator[Situation]:
+    """The situations that an interlock can be in."""
+    for situation in OF_INTERLOCK:
+        if situation == "old" and interlock.max_age_s is None:
+            continue
+        if situation == "publisher_gone" and not interlock.require_publisher:
+            continue
+        yield situation
+
+
+def plan_of(panel: Panel) -> Plan:
+    """The plan for the robot without a name, or for a panel of one robot (`panel_of`)."""
+    interlocks = {each.id: each for each in panel.interlocks if each.robot is None}
+    left_out: dict[str, str] = {}
+    controls: dict[str, Guarded] = {}
+    for widget in panel.commands:
+        guards = frozenset(widget.interlocks)
+        if unknown := guards - interlocks.keys():
+            left_out[str(widget.id)] = f"its interlock {min(unknown)} is another robot's"
+        elif confirmation_of(widget):
+            left_out[str(widget.id)] = "a person confirms it with a PIN"
+        else:
+            controls[str(widget.id)] = Guarded(widget, guards)
+    used = {guard for guarded in controls.values() for guard in guarded.guards}
+    alarms = []
+    for alarm in panel.alarms:
+        if provable(alarm):
+            alarms.append(alarm)
+        else:
+            left_out[f"alarm {alarm.id}"] = f"alarms by {alarm.source} are not raised by a value"
+    chosen = [each for name, each in interlocks.items() if name in used]
+    return Plan(controls, interlocks, rounds(chosen, controls), tuple(alarms), left_out)
+
+
+def provable(alarm: Alarm) -> bool:
+    """Whether a value raises it."""
+    return alarm.source in ("limits", "condition") and alarm.suppressed_while is None
+
+
+def rounds(
+    interlocks: Sequence[Interlock], controls: Mapping[str, Guarded]
+) -> Sequence[Sequence[Interlock]]:
+    """The interlocks in as few rounds as a greedy choice finds."""
+    made: list[list[Interlock]] = []
+    for interlock in interlocks:
+        for chosen in made:
+            if not any(_conflict(interlock, other, controls) for other in chosen):
+                chosen.append(interlock)
+                break
+        else:
+            made.append([interlock])
+    return made
+
+
+def _conflict(interlock: Interlock, other: Interlock, controls: Mapping[str, Guarded]) -> bool:
+    if interlock.topic == other.topic:
+        return True
+    return any({interlock.id, other.id} <= guarded.guards for guarded in controls.values())
+
+
+def judged_fields(panel: Panel) -> Mapping[Field, Sequence[Condition]]:
+    """The fields that interlocks and conditions judge, with these."""
+    judged: dict[Field, list[Condition]] = {}
+    for condition in panel.named_conditions:
+        if condition.robot is None:
+            judged.setdefault((condition.topic, condition.field), []).append(condition)
+    return judged

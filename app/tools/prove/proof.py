@@ -1,0 +1,620 @@
+"""Makes the proof: starts a panel for each round of interlocks, brings about each situation, and
+compares what the page shows and what the server answers with what must be.
+
+A case holds if the control is locked with a reason that names its interlock, nothing arrives at the
+robot though it is pressed past the page, and it works where everything permits.
+"""
+
+import json
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from app.panel.alarm import Alarm
+from app.panel.condition import Interlock
+from app.panel.model import Panel
+from app.panel.template import input_ids
+from app.panel.widgets.families import Command, Input
+from app.panel.widgets.hold import HoldCommand
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.parts import parts_of
+from app.panel.widgets.place import PlaceInput
+from app.panel.widgets.publish import Step
+from app.panel.widgets.switch import Switch
+from app.panel.widgets.templated import is_stop
+from app.records.entry import GOOD_OUTCOMES
+from app.system.errors import KioskError
+from app.system.texts import render
+from app.system.texts.text import each_language
+from app.tools.prove.browser import PageView, has_browser
+from app.tools.prove.cases import Guarded, HoldEnd, Plan, Situation, plan_of
+from app.tools.prove.rig import Rig, add_user
+from app.tools.prove.robot import ProvingRobot
+
+AT_ONCE: Final = 3  # rounds
+SHOWN_WITHIN_S: Final = 3.0  # a lock or its end, on the page
+JOINED_WITHIN_S: Final = 15.0
+QUIET_S: Final = 0.15  # in which what was sent wrongly would arrive
+STOPPED_WITHIN_S: Final = 1.0  # of a hold, from its end
+RAISED_WITHIN_S: Final = 3.0
+BROWSER_WITHIN_S: Final = 5.0  # on a busy machine a page is drawn late
+ENDED_WITHIN_S: Final = 12.0  # a goal of the simulated robot
+BEATS_S: Final = 0.08
+HELD_S: Final = 0.3
+OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
+
+
+class Result(NamedTuple):
+    """A case with what came out: `fault` is "" where it holds. `took_s` is how long the page took to
+    show it, or a hold to stop, None where nothing was timed. `shown` is the reason on the page."""
+
+    kind: str  # "control", "hold" or "alarm"
+    name: str
+    guard: str
+    situation: str
+    fault: str
+    took_s: float | None = None
+    shown: str = ""
+
+
+@dataclass
+class Proof:
+    """What was proved, and how long it took; `left_out` has why something was not."""
+
+    results: list[Result] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+    took_s: float = 0.0
+    browser: str = ""  # in which the pages were looked at, "" for none
+
+    @property
+    def faults(self) -> list[Result]:
+        return [result for result in self.results if result.fault]
+
+    @property
+    def holds(self) -> bool:
+        return bool(self.results) and not self.faults
+
+
+def prove(
+    panel: Panel, told: Callable[[Result], None] = lambda _: None, *, with_browser: bool = True
+) -> Proof:
+    """The proof of a panel with one robot; `with_browser`: its pages are looked at in Chromium too, if
+    there is one. KioskError if the panel can't be served."""
+    if panel.robots:
+        raise KioskError(
+            "this panel has several robots: prove proves panels of one robot, as each of them is one"
+        )
+    began, plan, proof = time.monotonic(), plan_of(panel), Proof()
+    proof.left_out = dict(plan.left_out)
+    proof.browser = has_browser() if with_browser else ""
+    lock = threading.Lock()
+
+    def tell(result: Result) -> None:
+        with lock:
+            proof.results.append(result)
+        told(result)
+
+    looks = bool(proof.browser)
+
+    def examine(chosen: Sequence[Interlock], folder: Path) -> None:
+        """A round of interlocks, or without any the panel as a whole."""
+        if chosen:
+            _Round(panel, plan, folder, tell, looks=looks).interlocks(chosen)
+        else:
+            _Round(panel, plan, folder / "whole", tell, looks=looks).whole()
+            _Round(panel, plan, folder / "roles", tell, looks=False).roles()
+
+    with (
+        tempfile.TemporaryDirectory(prefix="operator-panel-proof-") as folder,
+        ThreadPoolExecutor(AT_ONCE) as pool,
+    ):
+        rounds = (*plan.rounds, ())
+        places = [Path(folder) / str(number) for number in range(len(rounds))]
+        for _ in pool.map(examine, rounds, places):
+            pass  # what a round raises is raised here
+    proof.took_s = time.monotonic() - began
+    return proof
+
+
+class _Round:
+    """One running panel, and the situations that it is brought into."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        plan: Plan,
+        folder: Path,
+        tell: Callable[[Result], None],
+        *,
+        looks: bool,
+    ) -> None:
+        """`looks`: its pages are looked at in a browser."""
+        self._panel = panel
+        self._plan = plan
+        self._tell = tell
+        self._robot = ProvingRobot(panel)
+        self._rig = Rig(panel, self._robot, folder / "data")
+        self._view = PageView(folder / "browser") if looks else None
+        self._pages = {
+            str(widget.id): str(page.id)
+            for page in reversed(panel.pages)
+            for widget in (*page.widgets, *panel.frame.widgets)
+        }
+        self._inputs = {str(w.id): w for w in panel.widgets() if isinstance(w, Input)}
+        self._said = ""  # of the last press
+
+    # Rounds.
+
+    def interlocks(self, chosen: Sequence[Interlock]) -> None:
+        """The situations of some interlocks, of which no control has two."""
+        together = {guard for each in chosen for guard in self._together(each)}
+        topics = {each.topic for each in chosen}
+        self._robot.permit(chosen, together)
+        self._robot.silence(topics)
+        with self._rig, self._view or nullcontext():
+            self._await_link()
+            self._locked("never_seen", chosen, time.monotonic())
+            self._permitted(chosen, together)
+            self._forbidden(chosen, together)
+            self._permitted(chosen, together, again=True)
+            aged = [each for each in chosen if each.max_age_s is not None]
+            if aged:
+                self._robot.silence({each.topic for each in aged})
+                self._locked("old", aged, time.monotonic())
+                self._permitted(chosen, together, again=True)
+            self._announced("other_type", chosen, chosen, together)
+            required = [each for each in chosen if each.require_publisher]
+            self._announced("publisher_gone", required, chosen, together)
+            for each in chosen:
+                for guarded in self._guarded(each):
+                    if isinstance(guarded.control, HoldCommand):
+                        self._permit_others(guarded, each)
+                        self._await_free(str(guarded.control.id))
+                        self._hold(guarded, "forbids", each)
+
+    def whole(self) -> None:
+        """What concerns the panel as a whole: controls without interlocks, holds, alarms, the link, the
+        end of the server."""
+        interlocks = [*self._plan.interlocks.values()]
+        self._robot.permit(())
+        with self._rig, self._view or nullcontext():
+            self._await_link()
+            for guarded in self._plan.controls.values():
+                if not guarded.guards:
+                    self._works(guarded, "")
+            if self._panel.control.required:
+                self._without_right("no_control")
+            for guarded in self._plan.controls.values():
+                if isinstance(guarded.control, HoldCommand):
+                    self._permit_for(guarded, interlocks)
+                    for end in ("released", "page_gone", "no_beat"):
+                        self._hold(guarded, end, None)
+            self._robot.permit(())
+            for alarm in self._plan.alarms:
+                self._alarm(alarm)
+            self._rig.cut()
+            began = time.monotonic()
+            for guarded in self._plan.controls.values():
+                self._cut_off(guarded, "link_cut", began)
+            self._rig.shut_down()
+            for guarded in self._plan.controls.values():
+                self._refused_at_end(guarded)
+
+    def _permit_for(self, guarded: Guarded, interlocks: Sequence[Interlock]) -> None:
+        chosen = [each for each in interlocks if each.id in guarded.guards]
+        self._robot.permit(chosen, guarded.guards)
+        self._await_free(str(guarded.control.id))
+
+    # Situations.
+
+    def _await_link(self) -> None:
+        """Until the robot is joined: a control without interlocks is not locked then, or else some time
+        has passed."""
+        free = [name for name, guarded in self._plan.controls.items() if not guarded.guards]
+        if free:
+            self._rig.shown.wait(
+                lambda: any(not self._rig.is_locked(name) for name in free) and self._knows(),
+                JOINED_WITHIN_S,
+            )
+        else:
+            self._rig.shown.wait(self._knows, JOINED_WITHIN_S)
+        time.sleep(1.5)  # what is replayed after joining counts as known from then on
+
+    def _knows(self) -> bool:
+        return all(name in self._rig.shown.widgets for name in self._plan.controls)
+
+    def _permitted(
+        self, chosen: Sequence[Interlock], together: Collection[str], *, again: bool = False
+    ) -> None:
+        """Everything permits: each control works. `again`: only that it is not locked any more."""
+        self._robot.permit(chosen, together)
+        for interlock in chosen:
+            for guarded in self._guarded(interlock):
+                name = str(guarded.control.id)
+                self._permit_others(guarded, interlock)
+                if again:
+                    self._await_free(name)
+                else:
+                    self._works(guarded, interlock.id)
+
+    def _await_free(self, name: str) -> None:
+        self._rig.shown.wait(lambda: not self._rig.is_locked(name), SHOWN_WITHIN_S)
+
+    def _permit_others(self, guarded: Guarded, interlock: Interlock) -> None:
+        """Interlocks of this control on the field of another round have a value that permits it."""
+        others = [each for name, each in self._plan.interlocks.items() if name in guarded.guards]
+        ordered = sorted(others, key=lambda each: each.id == interlock.id)  # the last decides its field
+        self._robot.permit(ordered, guarded.guards)
+
+    def _forbidden(self, chosen: Sequence[Interlock], together: Collection[str]) -> None:
+        began = time.monotonic()
+        for interlock in chosen:
+            self._robot.forbid(interlock, together)
+        self._locked("forbids", chosen, began)
+
+    def _announced(
+        self,
+        situation: Situation,
+        changed: Sequence[Interlock],
+        chosen: Sequence[Interlock],
+        together: Collection[str],
+    ) -> None:
+        """The publishers of some interlocks have another type, or are gone."""
+        simulator = self._rig.simulator
+        if not changed or simulator is None:
+            return
+        began = time.monotonic()
+        for interlock in changed:
+            other = next(name for name in OTHER_TYPES if name != interlock.type)
+            simulator.announce(interlock.topic, other, gone=situation == "publisher_gone")
+        self._locked(situation, changed, began)
+        for interlock in changed:
+            simulator.announce(interlock.topic)
+        self._permitted(chosen, together, again=True)
+
+    # What must be.
+
+    def _locked(self, situation: Situation, chosen: Sequence[Interlock], began: float) -> None:
+        """Each control of these interlocks is locked by them, and a press past the page is refused."""
+        for interlock in chosen:
+            within_s = SHOWN_WITHIN_S + (interlock.max_age_s or 0.0)
+            for guarded in self._guarded(interlock):
+                name = str(guarded.control.id)
+                at = self._rig.shown.wait(partial(self._is_locked_by, name, interlock), within_s)
+                fault = self._why_not_locked(name, interlock) if at is None else ""
+                fault = fault or self._seen(name, locked=True, interlock=interlock)
+                fault = fault or self._refuses(guarded)
+                timed = None if at is None or situation == "never_seen" else max(0.0, at - began)
+                self._report(name, interlock.id, situation, fault, timed)
+
+    def _is_locked_by(self, name: str, interlock: Interlock) -> bool:
+        return self._rig.is_locked(name) and names_interlock(self._rig.reasons(name), interlock)
+
+    def _why_not_locked(self, name: str, interlock: Interlock) -> str:
+        if not self._rig.is_locked(name):
+            return "the page shows it as free"
+        return f'the reason does not name "{render(interlock.name)}": {self._rig.reasons(name)}'
+
+    def _seen(self, name: str, *, locked: bool, interlock: Interlock | None = None) -> str:
+        """That the browser shows a control as it is; "" if so, and where no page has a button for
+        it."""
+        page = self._pages.get(name)
+        if self._view is None or page is None:
+            return ""
+        self._view.open(f"http://127.0.0.1:{self._rig.port}/pages/{page}")
+        seen = self._view.shows(name, locked=locked, within_s=BROWSER_WITHIN_S)
+        if seen.locked is None:
+            return ""
+        if seen.locked is not locked:
+            return f"the browser shows it as {'free' if locked else 'locked'}"
+        if interlock is not None and not names_interlock(seen.text, interlock):
+            return f'what the browser says does not name "{render(interlock.name)}": {seen.text:.200}'
+        return ""
+
+    def _refuses(self, guarded: Guarded) -> str:
+        """That the server refuses a press past the page, and that nothing is sent; "" if so."""
+        before = self._arrived(guarded)
+        answer = self._press(guarded)
+        time.sleep(QUIET_S)
+        if self._arrived(guarded) != before:
+            return f"something was sent to the robot though it is locked: {answer}"
+        if answer in GOOD_OUTCOMES:
+            return f"the server answered {answer} to a press past the page"
+        return ""
+
+    def _works(self, guarded: Guarded, guard: str) -> None:
+        """That a press arrives at the robot where everything permits."""
+        name = str(guarded.control.id)
+        began = time.monotonic()
+        at = self._rig.shown.wait(lambda: not self._rig.is_locked(name), SHOWN_WITHIN_S)
+        if at is None:
+            self._leave_out(name, guard, self._rig.reasons(name))
+            return
+        took_s = max(0.0, at - began)
+        if fault := self._seen(name, locked=False):
+            self._report(name, guard, "permits", fault, took_s)
+            return
+        if isinstance(guarded.control, HoldCommand):
+            self._report(name, guard, "permits", self._holds(guarded), took_s)
+            return
+        before = self._arrived(guarded)
+        answer = self._press(guarded)
+        if isinstance(guarded.control, Switch) and answer == "refused":  # it may be there already
+            answer = self._press(guarded, is_on=False)
+        arrived = self._within(lambda: self._arrived(guarded) != before, SHOWN_WITHIN_S)
+        fault = "" if arrived else f"nothing arrived at the robot: {answer}, {self._said}"
+        self._rig.shown.wait(lambda: not self._rig.shown.widgets[name].get("busy"), ENDED_WITHIN_S)
+        self._report(name, guard, "permits", fault, took_s)
+
+    def _leave_out(self, name: str, guard: str, reason: str) -> None:
+        fault = f"it is locked while everything permits: {reason}"
+        self._report(name, guard, "permits", fault)
+
+    def _without_right(self, situation: Situation) -> None:
+        """Another client without control, or one without a role, presses each control: the server
+        refuses, and nothing is sent. A stop needs no control, but a role."""
+        with self._rig.as_stranger():
+            for guarded in self._plan.controls.values():
+                if isinstance(guarded.control, HoldCommand):
+                    continue
+                if situation == "no_control" and is_stop(guarded.control):
+                    continue
+                self._report(str(guarded.control.id), "", situation, self._refuses(guarded))
+
+    def roles(self) -> None:
+        """With users: a client that is not signed in presses each control."""
+        add_user(self._rig.data)
+        self._robot.permit(())
+        with self._rig:
+            self._await_link()
+            self._without_right("no_role")
+
+    def _cut_off(self, guarded: Guarded, situation: Situation, began: float) -> None:
+        name = str(guarded.control.id)
+        at = self._rig.shown.wait(lambda: self._rig.is_locked(name), 2 * SHOWN_WITHIN_S)
+        fault = "the page shows it as free" if at is None else self._seen(name, locked=True)
+        fault = fault or self._refuses(guarded)
+        self._report(name, "", situation, fault, None if at is None else max(0.0, at - began))
+
+    def _refused_at_end(self, guarded: Guarded) -> None:
+        answer = self._press(guarded)
+        fault = f"the server answered {answer} at its end" if answer in GOOD_OUTCOMES else ""
+        self._report(str(guarded.control.id), "", "shutdown", fault)
+
+    # Presses and holds.
+
+    def _press(self, guarded: Guarded, *, is_on: bool = True) -> str:
+        """The outcome of a press past the page, or of the begin of a hold. A switch is set to
+        `is_on`."""
+        if isinstance(guarded.control, HoldCommand):
+            return self._begin_refused(guarded)
+        values = self._values(guarded)
+        if isinstance(guarded.control, Switch):
+            values[str(guarded.control.id)] = is_on
+        status, receipt = self._rig.press(str(guarded.control.id), values)
+        self._said = f"{receipt.get('reason') or receipt.get('error') or ''} ({status})"
+        return str(receipt.get("outcome", "")) or f"status {status}"
+
+    def _values(self, guarded: Guarded) -> dict[str, Any]:
+        """Values of the inputs that a control sends."""
+        needed = input_ids(guarded.control)
+        own = {name: self._inputs[name] for name in needed if name in self._inputs}
+        values = {name: self._value_of_input(widget) for name, widget in own.items()}
+        own_value = value_of(guarded.control)
+        return values if own_value is None else {**values, str(guarded.control.id): own_value}
+
+    def _value_of_input(self, widget: Input) -> Any:
+        """An example, and of places one that the panel file has."""
+        if isinstance(widget, PlaceInput):
+            return next(iter(widget.places or [place.id for place in self._panel.places]), "none")
+        return widget.examples()[0]
+
+    def _socket(self, guarded: Guarded) -> ClientConnection:
+        address = f"127.0.0.1:{self._rig.port}"
+        origin = Origin(f"http://{address}")
+        return connect(f"ws://{address}/widgets/{guarded.control.id}/hold", origin=origin, proxy=None)
+
+    def _begin_refused(self, guarded: Guarded) -> str:
+        with self._socket(guarded) as socket:
+            try:
+                return "published" if self._begin(socket, guarded) else "refused"
+            except ConnectionClosed:
+                return "refused"
+
+    def _begin(self, socket: ClientConnection, guarded: Guarded) -> dict[str, Any] | None:
+        """The answer to the begin of a hold: None if it is refused."""
+        stamp = json.loads(socket.recv(5))["stamp"]
+        begin = {
+            "do": "begin", "inputs": self._values(guarded), "seen": self._rig.shown.event_id,
+            "stamp": stamp, "after": 1,
+        }  # fmt: skip
+        socket.send(json.dumps(begin))
+        answer: dict[str, Any] = json.loads(socket.recv(5))
+        return answer if answer.get("state") == "held" else None
+
+    def _holds(self, guarded: Guarded) -> str:
+        """That a hold is sent while it is held; "" if so."""
+        topic = str(getattr(guarded.control, "topic", ""))
+        before = self._robot.arrived[topic]
+        with self._socket(guarded) as socket:
+            try:
+                if (held := self._begin(socket, guarded)) is None:
+                    return "the server refuses the hold"
+                self._beat(socket, held, HELD_S)
+            except ConnectionClosed as closed:
+                return f"the server ended the hold: {closed}"
+        return "" if self._robot.arrived[topic] > before else "nothing arrived at the robot"
+
+    def _beat(self, socket: ClientConnection, held: Mapping[str, Any], for_s: float) -> int:
+        """Holds for some time; returns the number of the last beat."""
+        number, stamp, end = 0, held["stamp"], time.monotonic() + for_s
+        while time.monotonic() < end:
+            number += 1
+            beat = {"do": "beat", "number": number, "lease": held["lease"], "stamp": stamp, "after": 1}
+            socket.send(json.dumps({**beat, **DEFLECTED.get(held.get("kind", ""), {})}))
+            answer = json.loads(socket.recv(5))
+            stamp = answer.get("stamp", stamp)
+            time.sleep(BEATS_S)
+        return number
+
+    def _hold(self, guarded: Guarded, end: HoldEnd, interlock: Interlock | None) -> None:
+        """A hold that ends in a way: how long until the last message has left."""
+        name, topic = str(guarded.control.id), str(getattr(guarded.control, "topic", ""))
+        guard = interlock.id if interlock else ""
+        fault, took_s = "", None
+        socket = self._socket(guarded)
+        try:
+            if (held := self._begin(socket, guarded)) is None:
+                self._report(name, guard, end, "the server refuses the hold", kind="hold")
+                return
+            self._beat(socket, held, HELD_S)
+            began = time.monotonic()
+            if end == "released":
+                done = {"do": "end", "why": "released", "lease": held["lease"]}
+                socket.send(json.dumps({**done, "stamp": held["stamp"], "after": 1}))
+            elif end == "page_gone":
+                socket.close()
+            elif interlock is not None:
+                self._robot.forbid(interlock, guarded.guards)
+            fault, took_s = self._stopped(topic, began)
+        except (ConnectionClosed, TimeoutError) as closed:
+            fault = f"the hold ended by itself: {closed}"
+        finally:
+            socket.close()
+        self._report(name, guard, end, fault, took_s, kind="hold")
+
+    def _stopped(self, topic: str, began: float) -> tuple[str, float | None]:
+        """That nothing comes any more soon after the end; with the time of the last message."""
+        time.sleep(STOPPED_WITHIN_S)
+        count = self._robot.arrived[topic]
+        time.sleep(QUIET_S)
+        last_s = max(0.0, self._robot.arrived_at.get(topic, began) - began)
+        if self._robot.arrived[topic] != count:
+            return f"it is still sent {STOPPED_WITHIN_S:g} s after its end", None
+        return "", last_s
+
+    # Alarms.
+
+    def _alarm(self, alarm: Alarm) -> None:
+        """Raised, shown within its time, acknowledged, returned."""
+        name, fault, took_s = str(alarm.id), "", None
+        self._robot.set_alarm(alarm, raised=True)
+        began, within_s = time.monotonic(), RAISED_WITHIN_S + alarm.on_delay_s
+        if not self._within(lambda: self._alarm_state(name) == "active", within_s):
+            fault = f"it is not shown {within_s:g} s after its value: {self._alarm_state(name)}"
+        else:
+            took_s = time.monotonic() - began
+            fault = self._acknowledged(alarm)
+        self._robot.set_alarm(alarm, raised=False)
+        over = ("", "normal", "returned", "latched")
+        if not fault and not self._within(
+            lambda: self._alarm_state(name) in over, RAISED_WITHIN_S + alarm.off_delay_s
+        ):
+            fault = f"it does not return: {self._alarm_state(name)}"
+        self._report(name, "", "raised", fault, took_s, kind="alarm")
+
+    def _acknowledged(self, alarm: Alarm) -> str:
+        if alarm.ack == "none" or alarm.confirm_act:
+            return ""
+        row = self._alarm_row(str(alarm.id))
+        body = {"occurrence": row.get("occurrence", 0)}
+        status, answer = self._rig.request("POST", f"/alarms/{alarm.id}/acknowledge", body)
+        done = status == 200 and self._alarm_row(str(alarm.id)).get("acknowledged") is True
+        return "" if done else f"it can't be acknowledged: {answer}"
+
+    def _alarm_row(self, name: str) -> dict[str, Any]:
+        rows = self._rig.request("GET", "/alarms")[1].get("alarms", [])
+        return next((row for row in rows if row["id"] == name), {})
+
+    def _alarm_state(self, name: str) -> str:
+        return str(self._alarm_row(name).get("state", ""))
+
+    # Helpers.
+
+    def _guarded(self, interlock: Interlock) -> Iterator[Guarded]:
+        return (each for each in self._plan.controls.values() if interlock.id in each.guards)
+
+    def _together(self, interlock: Interlock) -> frozenset[str]:
+        """The interlocks that guard a control with this one."""
+        return frozenset().union(*(guarded.guards for guarded in self._guarded(interlock)))
+
+    def _arrived(self, guarded: Guarded) -> int:
+        """How many messages, requests and goals of a control have arrived."""
+        return sum(self._robot.arrived[name] for name in names_of(guarded.control))
+
+    def _within(self, condition: Callable[[], bool], within_s: float) -> bool:
+        end = time.monotonic() + within_s
+        while not condition():
+            if time.monotonic() >= end:
+                return False
+            time.sleep(0.02)
+        return True
+
+    def _report(
+        self,
+        name: str,
+        guard: str,
+        situation: str,
+        fault: str,
+        took_s: float | None = None,
+        kind: str = "control",
+    ) -> None:
+        shown = self._rig.reasons(name) if kind == "control" else ""
+        self._tell(Result(kind, name, guard, situation, fault, took_s, shown))
+
+
+DEFLECTED: Final[Mapping[str, Mapping[str, float]]] = {"joystick": {"x": 0.5, "y": 0.0}}
+
+
+def names_of(control: Command) -> frozenset[str]:
+    """The topics, services and actions to which a control sends."""
+    names = {
+        str(name)
+        for part in parts_of(control)
+        for name in (getattr(part, key, None) for key in ("topic", "service", "action"))
+        if name
+    }
+    if node := getattr(control, "node", None) or getattr(getattr(control, "set", None), "node", None):
+        names |= {f"{node}/set_parameters", f"{node}/set_parameters_atomically"}
+    return frozenset(names)
+
+
+def value_of(control: Command) -> Any:
+    """The value that a press of a control has of itself; None where it has none."""
+    if isinstance(control, Step):
+        return control.min + control.step
+    return _example_of(control) if isinstance(control, Parameter) else None
+
+
+def _example_of(widget: Parameter) -> Any:
+    """A value that a parameter may be set to."""
+    if widget.options:
+        return widget.options[0].value
+    if widget.type == "bool":
+        return True
+    if widget.has_numbers:
+        value = widget.min if widget.min is not None else widget.max if widget.max is not None else 0
+        return int(value) if widget.element_type == "integer" else float(value)
+    return "a"
+
+
+def names_interlock(reasons: str, interlock: Interlock) -> bool:
+    """Whether a reason that the page shows is about this interlock: its name, its topic, or its own
+    sentence."""
+    said = [*each_language(interlock.name).values(), *each_language(interlock.subject).values()]
+    if interlock.own_sentence is not None:
+        said += [
+            text.partition("{value}")[0] for text in each_language(interlock.own_sentence).values()
+        ]
+    return any(text and text in reasons for text in (*said, interlock.topic))

@@ -1,0 +1,303 @@
+"""The panel of the proof: the kiosk's own application with its robot simulated, served on loopback, and
+a client of it. Everything is in this process, in threads: nothing of it reaches a real robot."""
+
+import asyncio
+import http.client
+import json
+import logging
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AsyncExitStack, ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import uvicorn
+
+from app.cell.commands.judge import PressLimits
+from app.cell.people.access import Access
+from app.cell.people.secrets_hash import Cost, hashed
+from app.cell.people.users import User, UserBook
+from app.cell.people.users_file import UsersFile
+from app.cell.session.assembly import open_fleet, open_log
+from app.cell.session.doctor_process import DoctorProcess
+from app.panel import Panel
+from app.panel.checks.look import page_parts
+from app.panel.model import RobotEntry
+from app.panel.roles import ENGINEER
+from app.panel.rules import AccessRules
+from app.ros.messages import load_interfaces
+from app.system.errors import KioskError
+from app.system.settings import Settings, shipped_path
+from app.tools.prove.robot import ProvingRobot
+from app.tools.simulator.zenoh import ANY_PORT, Simulator, way_of
+from app.web.app_state import AppState
+from app.web.application import load_pages, new_application, page_assets, page_revision
+from app.web.metrics import Metrics
+from app.web.pages.compiled_templates import COMPILED
+from app.web.pages.page_templates import PageTemplates
+from app.web.server import OPTIONS
+
+log = logging.getLogger("kiosk.prove")
+
+STARTED_WITHIN_S: Final = 30.0
+ANSWER_WITHIN_S: Final = 10.0
+POLL_S: Final = 0.01
+QUICK: Final = Cost(8, 1)  # of a secret that nobody knows
+PACE_S: Final = 0.022  # between two presses: a client may press 50 times in a second
+
+
+@dataclass
+class Shown:
+    """What the events of a page have said last. Changed by the thread that reads them."""
+
+    widgets: dict[str, dict[str, Any]] = field(default_factory=dict)
+    alarms: dict[str, Any] = field(default_factory=dict)
+    event_id: str = ""
+    changed_at: float = 0.0  # monotonic seconds
+    changed: threading.Condition = field(default_factory=threading.Condition)
+
+    def take(self, event: str, data: Mapping[str, Any]) -> None:
+        with self.changed:
+            if event == "snapshot":
+                self.widgets = {name: dict(values) for name, values in data["widgets"].items()}
+                self.alarms = dict(data["alarms"])
+            elif event == "update":
+                for name, values in data.items():
+                    self.widgets.setdefault(name, {}).update(values)
+            elif event == "alarms":
+                rows = {**self.alarms.get("rows", {}), **data.get("rows", {})}
+                self.alarms = {**self.alarms, **data, "rows": rows}
+            self.changed_at = time.monotonic()
+            self.changed.notify_all()
+
+    def wait(self, condition: Callable[[], bool], within_s: float) -> float | None:
+        """When a condition was true (monotonic seconds); None if it was not in time."""
+        end = time.monotonic() + within_s
+        with self.changed:
+            while not condition():
+                if (left_s := end - time.monotonic()) <= 0:
+                    return None
+                self.changed.wait(left_s)
+            return self.changed_at
+
+
+@dataclass
+class Rig:
+    """A running panel with its proving robot. Used by the thread of one round of the proof."""
+
+    panel: Panel
+    robot: ProvingRobot
+    data: Path
+    shown: Shown = field(default_factory=Shown)
+    port: int = 0
+    simulator: Simulator | None = None
+    _simulating: ExitStack = field(default_factory=ExitStack)
+    _state: AppState | None = None
+    _loop: asyncio.AbstractEventLoop | None = None
+    _server: uvicorn.Server | None = None
+    _threads: list[threading.Thread] = field(default_factory=list)
+    _ends: threading.Event = field(default_factory=threading.Event)
+    _fault: BaseException | None = None
+    _pressed_at: float = 0.0
+    _cookie: str = ""
+
+    # Start and end.
+
+    def __enter__(self) -> "Rig":
+        serving = threading.Thread(target=self._serve, name="prove-server", daemon=True)
+        self._threads.append(serving)
+        serving.start()
+        end = time.monotonic() + STARTED_WITHIN_S
+        while not self._is_up():
+            if self._fault is not None:
+                raise KioskError(f"the panel did not start: {self._fault}") from self._fault
+            if time.monotonic() > end:
+                raise KioskError("the panel did not start in time")
+            time.sleep(POLL_S)
+        self._cookie = self._new_cookie()
+        if self.panel.control.required:
+            self.request("POST", "/control/take", {"id": secrets.token_hex(8)})
+        reading = threading.Thread(target=self._read_events, name="prove-events", daemon=True)
+        self._threads.append(reading)
+        reading.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ends.set()
+        if self._server is not None:
+            self._server.should_exit = True
+        for thread in self._threads:
+            thread.join(STARTED_WITHIN_S)
+
+    def _is_up(self) -> bool:
+        return self._server is not None and self._server.started
+
+    def _serve(self) -> None:
+        try:
+            asyncio.run(self._serve_until_end())
+        except Exception as error:  # told to the thread that waits for the start
+            self._fault = error
+
+    async def _serve_until_end(self) -> None:
+        settings = replace(
+            Settings.from_environment({}),
+            panel=Path("the panel of the proof"), mode="demo", data=self.data, root_path="", dev=False,
+        )  # fmt: skip
+        self._loop = asyncio.get_running_loop()
+        async with AsyncExitStack() as stack:
+            oplog = await stack.enter_async_context(open_log(settings, self.panel))
+            assets = page_assets(self.panel)
+            doctor = DoctorProcess(settings)
+            stack.push_async_callback(doctor.stop)
+            limits = PressLimits(partial(oplog.suppress, limited=True))
+            revision = page_revision(self.panel, assets)
+            opened = open_fleet(settings, self.panel, revision, oplog, self._simulate, doctor)
+            fleet = await stack.enter_async_context(opened)
+            access = Access(UsersFile(self.data), AccessRules(), oplog)
+            await access.reload()
+            stack.callback(access.close)
+            templates = PageTemplates(
+                shipped_path("templates"), page_parts(self.panel), shipped_path(COMPILED)
+            )
+            metrics = Metrics(fleet, lambda: 0, lambda: limits.refused, lambda: {})
+            self._state = AppState(fleet, assets, templates, metrics, oplog, limits, doctor, access)
+            app = new_application(settings, self.panel.embed)
+            app.state.app_state = self._state
+            await load_pages(app, self._state, self.panel)
+            listening = socket.create_server(("127.0.0.1", 0))
+            self.port = listening.getsockname()[1]
+            config = uvicorn.Config(
+                app, log_level="error", timeout_graceful_shutdown=1, lifespan="off", **OPTIONS
+            )
+            self._server = uvicorn.Server(config)
+            self._server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]
+            await self._server.serve(sockets=[listening])
+            fleet.close()
+
+    @contextmanager
+    def _simulate(self, panel: Panel, entry: RobotEntry | None) -> Iterator[str]:
+        """The robot as `open_fleet` starts it."""
+        namespace = entry.namespace if entry else panel.namespace
+        interfaces = load_interfaces(panel.distro, panel.interfaces)
+        ways = {namespace: way_of(panel, entry or panel)}
+        with self._simulating:
+            simulator = Simulator(ANY_PORT, {namespace: self.robot}, interfaces, ways=ways)
+            self.simulator = self._simulating.enter_context(simulator)
+            yield simulator.endpoint
+
+    def cut(self) -> None:
+        """The link to the robot is cut."""
+        self._simulating.close()
+
+    def shut_down(self) -> None:
+        """The server begins to end: it still answers."""
+        assert self._loop is not None
+        assert self._state is not None
+        done = threading.Event()
+
+        def begin() -> None:
+            assert self._state is not None
+            for session in self._state.fleet.sessions:
+                session.commands.close()
+            done.set()
+
+        self._loop.call_soon_threadsafe(begin)
+        done.wait(ANSWER_WITHIN_S)
+
+    # What a client does.
+
+    def press(self, control: str, inputs: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:
+        """One press over HTTP, past the page: the status and the receipt."""
+        time.sleep(max(0.0, self._pressed_at + PACE_S - time.monotonic()))
+        self._pressed_at = time.monotonic()
+        body = {"inputs": dict(inputs), "id": secrets.token_hex(8)}
+        return self.request("POST", f"/widgets/{control}", body)
+
+    def request(
+        self, method: str, path: str, body: Mapping[str, Any] | None = None
+    ) -> tuple[int, dict[str, Any]]:
+        """A request with JSON; its status and its JSON, {} for another answer."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
+        try:
+            headers = {
+                "accept": "application/json", "content-type": "application/json",
+                "cookie": self._cookie,
+            }  # fmt: skip
+            connection.request(method, path, json.dumps(body) if body is not None else None, headers)
+            answer = connection.getresponse()
+            text = answer.read()
+        finally:
+            connection.close()
+        try:
+            return answer.status, json.loads(text)
+        except ValueError:
+            return answer.status, {}
+
+    def _new_cookie(self) -> str:
+        """The cookie of a client that has not been here yet."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
+        try:
+            connection.request(
+                "GET", "/", headers={"accept": "text/html", "sec-fetch-dest": "document"}
+            )
+            answer = connection.getresponse()
+            answer.read()
+            return "; ".join(each.partition(";")[0] for each in answer.msg.get_all("set-cookie", []))
+        finally:
+            connection.close()
+
+    @contextmanager
+    def as_stranger(self) -> Iterator[None]:
+        """Requests within the block are those of another client."""
+        own, self._cookie = self._cookie, self._new_cookie()
+        try:
+            yield
+        finally:
+            self._cookie = own
+
+    def is_locked(self, control: str) -> bool:
+        """Whether the events of the page say that a control is locked."""
+        return self.shown.widgets.get(control, {}).get("enabled") is False
+
+    def reasons(self, control: str) -> str:
+        """Why it is locked, as the page says it."""
+        shown = self.shown.widgets.get(control, {})
+        return str(shown.get("reasons") or shown.get("reason") or "")
+
+    def _read_events(self) -> None:
+        while not self._ends.is_set():
+            with suppress(OSError, http.client.HTTPException, ValueError):
+                self._read_stream()
+            time.sleep(POLL_S)
+
+    def _read_stream(self) -> None:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        try:
+            connection.request("GET", "/events", headers={"cookie": self._cookie})
+            event, answer = "", connection.getresponse()
+            while not self._ends.is_set() and (line := answer.readline().decode()):
+                name, _, value = line.rstrip("\n").partition(": ")
+                if name == "event":
+                    event = value
+                elif name == "id":
+                    self.shown.event_id = value
+                elif name == "data":
+                    self.shown.take(event, json.loads(value))
+        finally:
+            connection.close()
+
+
+def add_user(folder: Path) -> None:
+    """The panel has a user from now on, so a client that is not signed in has no role."""
+
+    def edit(book: UserBook) -> UserBook:
+        user = User("proof", ENGINEER, (), hashed(secrets.token_hex(8), QUICK), "", "")
+        return book.with_user(user, "proof").with_change("proof", "add", user.name, user.role, "proof")
+
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    UsersFile(folder).edit(edit)
