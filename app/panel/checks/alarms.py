@@ -140,7 +140,7 @@ def stop_faults(panel: Panel) -> Iterator[Fault]:
     for n, name in enumerate(panel.state.effects):
         if name not in known:
             message = f'no interlock, condition or alarm "{name}"; {known_hint(name, known)}'
-            yield Fault(f"state.effects[{n}]", message, cause=f"effect {name}")
+            yield Fault(f"state.effects[{n}]", message, cause=f"interlock {name}")
 
 
 def _command_faults(place: str, alarm: Alarm, panel: Panel, faulty: Collection[str]) -> Iterator[Fault]:
