@@ -142,7 +142,7 @@ def _tour_faults(place: str, widget: Tour, panel: Panel) -> Iterator[Fault]:
         message = no_such("action", widget.action, actions)
         if not actions:
             message = 'is the id of an action, and the panel has none: add one with kind = "action"'
-        yield Fault(f"{place}.action", message, cause=f"action {widget.action}")
+        yield Fault(f"{place}.action", message, cause=f"control {widget.action}")
     elif widget.action is None and not sent_by:
         message = "is missing: the id of the action whose goals it shows, or an action that sends"
         yield Fault(f"{place}.action", f'{message} "{{{widget.id}.poses}}"', cause="tour")

@@ -19,7 +19,19 @@ _CLAIM: Final = 'is not the name of a claim: it must be like "preferred_username
 # The rule of a text, by its key: each key with a pattern has a row.
 PATTERNS: Final[Mapping[str, str]] = {
     **dict.fromkeys(
-        ("id", "robot", "needs", "groups", "interlock", "page", "fields", "condition", "places"), NO_ID
+        (
+            "id",
+            "robot",
+            "needs",
+            "groups",
+            "interlock",
+            "page",
+            "fields",
+            "condition",
+            "places",
+            "effects",
+        ),
+        NO_ID,
     ),
     **dict.fromkeys(("map", "level", "alarms", "action", "ack_command", "ack_input"), NO_ID),
     **dict.fromkeys(("logo", "src", "picture"), _PICTURE),
