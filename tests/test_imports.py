@@ -39,6 +39,7 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "tools": (
         ("cell_config", "doctor", "install", "kiosk", "simulator"),
+        ("prove",),
         ("scaffold",),
         ("robot",),
         ("editor",),

@@ -11,6 +11,7 @@ from app.panel.model import Panel
 from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.key_parts import confirmation_of
+from app.panel.widgets.recipe_load import RecipeLoad
 
 Situation = Literal[
     "permits", "forbids", "never_seen", "old", "other_type", "publisher_gone",
@@ -107,6 +108,8 @@ def plan_of(panel: Panel) -> Plan:
             left_out[str(widget.id)] = f"its interlock {min(unknown)} is another robot's"
         elif confirmation_of(widget):
             left_out[str(widget.id)] = "a person confirms it with a PIN"
+        elif isinstance(widget, RecipeLoad):
+            left_out[str(widget.id)] = "a recipe is chosen on its page"
         else:
             controls[str(widget.id)] = Guarded(widget, guards)
     used = {guard for guarded in controls.values() for guard in guarded.guards}

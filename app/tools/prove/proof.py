@@ -9,9 +9,9 @@ import json
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -105,7 +105,7 @@ def prove(
             proof.results.append(result)
         told(result)
 
-    looks = bool(proof.browser)
+    looks = bool(proof.browser) and not panel.control.required  # the proof's own client has control
 
     def examine(chosen: Sequence[Interlock], folder: Path) -> None:
         """A round of interlocks, or without any the panel as a whole."""
@@ -114,6 +114,7 @@ def prove(
         else:
             _Round(panel, plan, folder / "whole", tell, looks=looks).whole()
             _Round(panel, plan, folder / "roles", tell, looks=False).roles()
+            _Round(panel, plan, folder / "ending", tell, looks=False).ending()
 
     with (
         tempfile.TemporaryDirectory(prefix="operator-panel-proof-") as folder,
@@ -152,7 +153,7 @@ class _Round:
             for widget in (*page.widgets, *panel.frame.widgets)
         }
         self._inputs = {str(w.id): w for w in panel.widgets() if isinstance(w, Input)}
-        self._said = ""  # of the last press
+        self._said = self._code = ""  # of the last press
 
     # Rounds.
 
@@ -207,8 +208,16 @@ class _Round:
             began = time.monotonic()
             for guarded in self._plan.controls.values():
                 self._cut_off(guarded, "link_cut", began)
+
+    def ending(self) -> None:
+        """The server begins to end while everything permits."""
+        interlocks = [*self._plan.interlocks.values()]
+        self._robot.permit(())
+        with self._rig:
+            self._await_link()
             self._rig.shut_down()
             for guarded in self._plan.controls.values():
+                self._permit_for(guarded, interlocks)
                 self._refused_at_end(guarded)
 
     def _permit_for(self, guarded: Guarded, interlocks: Sequence[Interlock]) -> None:
@@ -350,7 +359,7 @@ class _Round:
             return
         before = self._arrived(guarded)
         answer = self._press(guarded)
-        if isinstance(guarded.control, Switch) and answer == "refused":  # it may be there already
+        if self._code == "switch_reported_already":
             answer = self._press(guarded, is_on=False)
         arrived = self._within(lambda: self._arrived(guarded) != before, SHOWN_WITHIN_S)
         fault = "" if arrived else f"nothing arrived at the robot: {answer}, {self._said}"
@@ -363,12 +372,12 @@ class _Round:
 
     def _without_right(self, situation: Situation) -> None:
         """Another client without control, or one without a role, presses each control: the server
-        refuses, and nothing is sent. A stop needs no control, but a role."""
+        refuses, and nothing is sent. A stop needs neither."""
         with self._rig.as_stranger():
             for guarded in self._plan.controls.values():
                 if isinstance(guarded.control, HoldCommand):
                     continue
-                if situation == "no_control" and is_stop(guarded.control):
+                if is_stop(guarded.control):
                     continue
                 self._report(str(guarded.control.id), "", situation, self._refuses(guarded))
 
@@ -388,8 +397,7 @@ class _Round:
         self._report(name, "", situation, fault, None if at is None else max(0.0, at - began))
 
     def _refused_at_end(self, guarded: Guarded) -> None:
-        answer = self._press(guarded)
-        fault = f"the server answered {answer} at its end" if answer in GOOD_OUTCOMES else ""
+        fault = self._refuses(guarded)
         self._report(str(guarded.control.id), "", "shutdown", fault)
 
     # Presses and holds.
@@ -403,6 +411,7 @@ class _Round:
         if isinstance(guarded.control, Switch):
             values[str(guarded.control.id)] = is_on
         status, receipt = self._rig.press(str(guarded.control.id), values)
+        self._code = str(receipt.get("code", ""))
         self._said = f"{receipt.get('reason') or receipt.get('error') or ''} ({status})"
         return str(receipt.get("outcome", "")) or f"status {status}"
 
@@ -456,43 +465,45 @@ class _Round:
                 return f"the server ended the hold: {closed}"
         return "" if self._robot.arrived[topic] > before else "nothing arrived at the robot"
 
-    def _beat(self, socket: ClientConnection, held: Mapping[str, Any], for_s: float) -> int:
-        """Holds for some time; returns the number of the last beat."""
-        number, stamp, end = 0, held["stamp"], time.monotonic() + for_s
+    def _beat(self, socket: ClientConnection, held: dict[str, Any], for_s: float) -> None:
+        """Holds for some time; `held` has the stamp of the last answer, and the number of the last
+        beat."""
+        end = time.monotonic() + for_s
         while time.monotonic() < end:
-            number += 1
-            beat = {"do": "beat", "number": number, "lease": held["lease"], "stamp": stamp, "after": 1}
-            socket.send(json.dumps({**beat, **DEFLECTED.get(held.get("kind", ""), {})}))
-            answer = json.loads(socket.recv(5))
-            stamp = answer.get("stamp", stamp)
+            held["number"] = number = held.get("number", 0) + 1
+            beat = {"do": "beat", "number": number, "lease": held["lease"], "stamp": held["stamp"]}
+            socket.send(json.dumps({**beat, "after": 1}))
+            held["stamp"] = json.loads(socket.recv(5)).get("stamp", held["stamp"])
             time.sleep(BEATS_S)
-        return number
 
     def _hold(self, guarded: Guarded, end: HoldEnd, interlock: Interlock | None) -> None:
         """A hold that ends in a way: how long until the last message has left."""
-        name, topic = str(guarded.control.id), str(getattr(guarded.control, "topic", ""))
-        guard = interlock.id if interlock else ""
-        fault, took_s = "", None
-        socket = self._socket(guarded)
+        name, guard = str(guarded.control.id), interlock.id if interlock else ""
         try:
-            if (held := self._begin(socket, guarded)) is None:
-                self._report(name, guard, end, "the server refuses the hold", kind="hold")
-                return
-            self._beat(socket, held, HELD_S)
-            began = time.monotonic()
-            if end == "released":
-                done = {"do": "end", "why": "released", "lease": held["lease"]}
-                socket.send(json.dumps({**done, "stamp": held["stamp"], "after": 1}))
-            elif end == "page_gone":
-                socket.close()
-            elif interlock is not None:
-                self._robot.forbid(interlock, guarded.guards)
-            fault, took_s = self._stopped(topic, began)
+            with self._socket(guarded) as socket:
+                fault, took_s = self._held_until(socket, guarded, end, interlock)
         except (ConnectionClosed, TimeoutError) as closed:
-            fault = f"the hold ended by itself: {closed}"
-        finally:
-            socket.close()
+            fault, took_s = f"the hold ended by itself: {closed}", None
         self._report(name, guard, end, fault, took_s, kind="hold")
+
+    def _held_until(
+        self, socket: ClientConnection, guarded: Guarded, end: HoldEnd, interlock: Interlock | None
+    ) -> tuple[str, float | None]:
+        """Holds for a moment, brings about the end, and looks whether it stops."""
+        if (held := self._begin(socket, guarded)) is None:
+            return "the server refuses the hold", None
+        self._beat(socket, held, HELD_S)
+        began = time.monotonic()
+        if end == "released":
+            done = {"do": "end", "why": "released", "lease": held["lease"]}
+            socket.send(json.dumps({**done, "stamp": held["stamp"], "after": 1}))
+        elif end == "page_gone":
+            socket.close()
+        elif interlock is not None:
+            self._robot.forbid(interlock, guarded.guards)
+            with suppress(ConnectionClosed):  # the finger stays on it
+                self._beat(socket, held, 2 * STOPPED_WITHIN_S)
+        return self._stopped(str(getattr(guarded.control, "topic", "")), began)
 
     def _stopped(self, topic: str, began: float) -> tuple[str, float | None]:
         """That nothing comes any more soon after the end; with the time of the last message."""
@@ -500,8 +511,8 @@ class _Round:
         count = self._robot.arrived[topic]
         time.sleep(QUIET_S)
         last_s = max(0.0, self._robot.arrived_at.get(topic, began) - began)
-        if self._robot.arrived[topic] != count:
-            return f"it is still sent {STOPPED_WITHIN_S:g} s after its end", None
+        if self._robot.arrived[topic] != count or last_s > STOPPED_WITHIN_S:
+            return f"it is still sent {last_s:.1f} s after its end", None
         return "", last_s
 
     # Alarms.
@@ -572,9 +583,6 @@ class _Round:
     ) -> None:
         shown = self._rig.reasons(name) if kind == "control" else ""
         self._tell(Result(kind, name, guard, situation, fault, took_s, shown))
-
-
-DEFLECTED: Final[Mapping[str, Mapping[str, float]]] = {"joystick": {"x": 0.5, "y": 0.0}}
 
 
 def names_of(control: Command) -> frozenset[str]:

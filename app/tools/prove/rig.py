@@ -47,6 +47,7 @@ log = logging.getLogger("kiosk.prove")
 STARTED_WITHIN_S: Final = 30.0
 ANSWER_WITHIN_S: Final = 10.0
 POLL_S: Final = 0.01
+KEPT_EVERY_S: Final = 1.0
 QUICK: Final = Cost(8, 1)  # of a secret that nobody knows
 PACE_S: Final = 0.022  # between two presses: a client may press 50 times in a second
 
@@ -122,6 +123,9 @@ class Rig:
         self._cookie = self._new_cookie()
         if self.panel.control.required:
             self.request("POST", "/control/take", {"id": secrets.token_hex(8)})
+            holding = threading.Thread(target=self._keep_control, name="prove-control", daemon=True)
+            self._threads.append(holding)
+            holding.start()
         reading = threading.Thread(target=self._read_events, name="prove-events", daemon=True)
         self._threads.append(reading)
         reading.start()
@@ -219,14 +223,14 @@ class Rig:
         return self.request("POST", f"/widgets/{control}", body)
 
     def request(
-        self, method: str, path: str, body: Mapping[str, Any] | None = None
+        self, method: str, path: str, body: Mapping[str, Any] | None = None, cookie: str = ""
     ) -> tuple[int, dict[str, Any]]:
         """A request with JSON; its status and its JSON, {} for another answer."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
         try:
             headers = {
                 "accept": "application/json", "content-type": "application/json",
-                "cookie": self._cookie,
+                "cookie": cookie or self._cookie,
             }  # fmt: skip
             connection.request(method, path, json.dumps(body) if body is not None else None, headers)
             answer = connection.getresponse()
@@ -268,6 +272,13 @@ class Rig:
         """Why it is locked, as the page says it."""
         shown = self.shown.widgets.get(control, {})
         return str(shown.get("reasons") or shown.get("reason") or "")
+
+    def _keep_control(self) -> None:
+        """As the page of a holder that is touched."""
+        own = self._cookie
+        while not self._ends.wait(KEPT_EVERY_S):
+            with suppress(OSError, http.client.HTTPException):
+                self.request("POST", "/control/here", {"touched": True}, own)
 
     def _read_events(self) -> None:
         while not self._ends.is_set():

@@ -1,0 +1,187 @@
+"""The proof of a panel: it holds for the code as it is, and not for code that decides wrongly."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.cell.commands import holds, presses
+from app.cell.commands.judge import PressJudge
+from app.cell.permission import conditions, interlocks, press_permission
+from app.cell.permission.verdict import PERMITTED, Verdict
+from app.panel import Panel, load_panel
+from app.tools.cli.prove import main
+from app.tools.prove import proof as proving
+from app.tools.prove.cases import plan_of
+from app.tools.prove.proof import Proof, prove
+
+PANEL = """
+title = "Cell"
+language = "en"
+[[interlock]]
+id = "guard"
+label = "Guard door"
+topic = "/guard"
+max_age_s = 0.6
+require_publisher = true
+[[interlock]]
+id = "mode"
+label = "Automatic"
+topic = "/mode"
+type = "std_msgs/msg/String"
+equals = "AUTO"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Empty"
+message = {}
+interlock = ["guard", "mode"]
+[[page.widget]]
+id = "jog"
+kind = "hold"
+label = "Jog"
+topic = "/jog"
+type = "std_msgs/msg/Float64"
+message = { data = 1.0 }
+release = { data = 0.0 }
+interlock = "guard"
+[[page.widget]]
+id = "horn"
+kind = "publish"
+label = "Horn"
+topic = "/horn"
+type = "std_msgs/msg/Empty"
+message = {}
+[[alarm]]
+id = "hot"
+topic = "/temperature"
+type = "std_msgs/msg/Float64"
+text = "Too hot"
+high = 80.0
+"""
+
+
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Panel:
+    path = tmp_path_factory.mktemp("panel") / "cell.toml"
+    path.write_text(PANEL)
+    return load_panel(path)
+
+
+def proved(panel: Panel) -> Proof:
+    return prove(panel, with_browser=False)
+
+
+@pytest.fixture(scope="module")
+def whole(panel: Panel) -> Proof:
+    return proved(panel)
+
+
+def test_every_case_holds_and_none_is_left_out(panel: Panel, whole: Proof) -> None:
+    assert [tuple(result) for result in whole.faults] == []
+    assert whole.left_out == {}
+    tried = {(row.name, row.guard, row.situation) for row in whole.results}
+    plan = plan_of(panel)
+    assert {tuple(case) for case in plan.cases()} <= tried
+    assert {(case.control, case.guard, case.end) for case in plan.holds()} <= tried
+    of_all = {("start", "", situation) for situation in ("link_cut", "shutdown", "no_role")}
+    assert of_all | {("hot", "", "raised")} <= tried
+
+
+def test_what_the_page_says_names_the_interlock_and_times_are_measured(whole: Proof) -> None:
+    rows = {(row.name, row.guard, row.situation): row for row in whole.results}
+    assert "Guard door" in rows["start", "guard", "forbids"].shown
+    old = rows["start", "guard", "old"].took_s
+    assert old is not None
+    assert 0.3 < old < 3.0
+    assert rows["jog", "", "released"].took_s is not None
+
+
+def always(value: Any) -> Any:
+    return lambda *_, **__: value
+
+
+# Code that decides wrongly: (module or class, name, in its place).
+MUTANTS: dict[str, tuple[Any, str, Any]] = {
+    "a value that does not permit counts as one that does": (conditions, "permits", lambda *_: True),
+    "values do not get old": (conditions, "stale_at", lambda *_: math.inf),
+    "presses go on at the end of the server": (presses.Presses, "close", lambda _: None),
+    "another type is read": (interlocks, "topic_mismatch", always(None)),
+    "a topic that was never received permits": (conditions, "unread", always(PERMITTED)),
+    "the reason says nothing": (conditions, "refusal", always(Verdict(False, "x", "Locked."))),
+    "a press is not judged by interlocks": (press_permission, "interlock_verdict", always(PERMITTED)),
+    "a press is not judged": (PressJudge, "verdict", always(PERMITTED)),
+    "a hold is judged at its begin only": (holds.HoldController, "judge", lambda _: None),
+    "a lease does not end": (holds.Lease, "end_code", always("")),
+    "a closed page holds on": (holds, "LEASE_S", 60.0),
+}
+
+
+@pytest.mark.long("table")
+@pytest.mark.parametrize("mutant", MUTANTS)
+def test_wrong_code_does_not_hold(panel: Panel, monkeypatch: pytest.MonkeyPatch, mutant: str) -> None:
+    where, name, instead = MUTANTS[mutant]
+    monkeypatch.setattr(where, name, instead)
+    assert proved(panel).faults
+
+
+def test_the_command_reports_and_signs(
+    whole: Proof,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(proving, "prove", always(whole))
+    path, page = tmp_path / "cell.toml", tmp_path / "proof.html"
+    path.write_text(PANEL)
+    arguments = [str(path), "--json", "--report", str(page), "--sign", "--data", str(tmp_path / "data")]
+    assert main(arguments) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["holds"] is True
+    assert len(report["results"]) == report["cases"] > 20
+    assert _is_signed(report)
+    report["results"][0]["fault"] = "none of it"
+    assert not _is_signed(report)
+    text = page.read_text()
+    assert "Every case holds" in text
+    assert report["sha256"] in text
+
+
+def _is_signed(report: dict[str, Any]) -> bool:
+    from base64 import b64decode
+
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    from app.tools.prove.report import canonical
+
+    key = Ed25519PublicKey.from_public_bytes(b64decode(report["key"]))
+    try:
+        key.verify(b64decode(report["signature"]), canonical(report))
+    except InvalidSignature:
+        return False
+    return True
+
+
+def test_a_panel_that_can_not_be_used_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(PANEL.replace('kind = "hold"', 'kind = "hole"'))
+    assert main([str(path)]) == 2
+    assert "cell.toml" in capsys.readouterr().err
+
+
+def test_several_robots_are_not_proved_yet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robots = '[[robot]]\nid = "a"\nname = "A"\nnamespace = "/a"\n'
+    path = tmp_path / "cell.toml"
+    path.write_text(PANEL.replace("[[interlock]]", f"{robots}[[interlock]]", 1))
+    assert main([str(path)]) == 2
+    assert "several robots" in capsys.readouterr().err
