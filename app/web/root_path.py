@@ -28,6 +28,7 @@ OWN_PATHS: Final = frozenset(
             "users",
         ),
         *("places", "static", "healthz", "readyz", "metrics", "gallery", "openapi.json"),
+        *("wall", "panel"),
     }
 )
 

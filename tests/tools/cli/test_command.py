@@ -61,10 +61,10 @@ def test_no_command_is_help_and_an_error(capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["rnu"], '"rnu" is not a command: there is run, check, edit, send, log, simulate'),
+        (["rnu"], '"rnu" is not a command: there is run, check, prove, edit, send, log, simulate'),
         (["cell1.toml"], "did you mean operator-panel run cell1.toml?"),
         (["--verison"], "--verison is not an option"),
-        (["--"], "the command is missing: there is run, check, edit, send, log, simulate"),
+        (["--"], "the command is missing: there is run, check, prove, edit, send, log, simulate"),
         (["log", "veryfy"], "argument COMMAND: invalid choice: 'veryfy'"),
         (["log"], "the following arguments are required: COMMAND"),
         (["check", "--verbos"], "--verbos is not an option of this command: did you mean --verbose?"),
