@@ -126,6 +126,7 @@ PALLETIZING: Final = Story(
         "/cell/minutes_left": NUMBER,
         "/cell/rate": COUNT,
         "/cell/shift_boxes": COUNT,
+        "/cell/rejects": COUNT,
         "/guard_locked": BOOL,
         "/cell/no_fault": BOOL,
         "/cell/air_enough": BOOL,

@@ -37,6 +37,7 @@ from app.panel.rules import (
     EmbedRules,
     Keyboard,
     LogRules,
+    OeeRules,
     RecordRules,
     ScreenRules,
     SiteRules,
@@ -188,6 +189,7 @@ class PanelKeys(Description):
     brand: BrandRules | None = None
     frame: Frame = Frame.model_validate({})
     state: StateRules | None = None
+    oee: OeeRules | None = None
     control: ControlRules = ControlRules(required=False)
     access: AccessRules = AccessRules()
     embed: EmbedRules = EmbedRules()

@@ -271,7 +271,8 @@ class Panel(PanelKeys):
         alarmed = (source for alarm in self.alarms for source in alarm.sources())
         shown = (source for widget in self.displays for source in widget.sources())
         pressed = (source for command in self.commands for source in command.sources())
-        return tuple(dict.fromkeys((*judged, *alarmed, *shown, *pressed)))
+        counted = self.oee.sources() if self.oee else ()
+        return tuple(dict.fromkeys((*judged, *alarmed, *shown, *pressed, *counted)))
 
     def actions(self) -> dict[str, str]:
         """Action → type of all actions that the panel may send goals to."""

@@ -1,5 +1,5 @@
 """The tables `[access]`, `[access.oidc]`, `[brand]`, `[control]`, `[diagnostics]`, `[embed]`, `[log]`,
-`[record]`, `[screen]`, `[site]` and `[state]` of a panel file."""
+`[oee]`, `[record]`, `[screen]`, `[site]` and `[state]` of a panel file."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field
 from app.panel.base import (
     Description,
     Endpoint,
+    Icon,
     Id,
     Label,
     Note,
@@ -24,6 +25,7 @@ from app.panel.base import (
 from app.panel.checks.types import value_faults
 from app.panel.constants import parent_type
 from app.panel.roles import ENGINEER, ROLES
+from app.panel.shared_keys import NeedsKey
 from app.panel.widgets.displays import (
     LampState,
     PictureName,
@@ -292,3 +294,63 @@ class MachineState(Display):
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         yield from state_faults(place, self, field_type, interfaces, "the machine's state")
+
+
+# The table `[oee]` of a panel file: why the machine stood still, and the figures of a shift.
+
+BREAK: Final = r"^([01][0-9]|2[0-3]):[0-5][0-9]-([01][0-9]|2[0-3]):[0-5][0-9]$"
+Break = Annotated[str, Field(pattern=BREAK)]
+MAX_REASONS: Final = 6
+MAX_COUNTERS: Final = 3
+
+
+class OeeReason(Description):
+    """Why the machine stood still, as an operator says it by one key. A `planned` one is no loss: its
+    time does not count as planned busy time."""
+
+    id: Id
+    label: Label
+    note: Note | None = None
+    icon: Icon | None = None
+    planned: bool = False
+
+
+class OeeCounter(TopicField):
+    """A number that rises with each part of a sort. It may begin at zero again."""
+
+    parts: Literal["good", "bad", "all"]
+
+
+class OeeRules(NeedsKey):
+    """Asks for the reason of a stop of at least `reason_after_s`, and has what the figures of a shift
+    are computed from. `running` are the values of `[state]` with which the machine produces; by default
+    those of the shape "play". `breaks` are times of day that are not planned to be worked. `needs` is
+    the role or group that answers."""
+
+    reason_after_s: Seconds = 120.0
+    reasons: Annotated[tuple[OeeReason, ...], Field(strict=False, max_length=MAX_REASONS)] = Field(
+        (), alias="reason"
+    )
+    running: Annotated[tuple[StateValue, ...] | None, Field(strict=False)] = None
+    breaks: Annotated[tuple[Break, ...], Field(strict=False, max_length=12)] = ()
+    ideal_cycle_s: Seconds | None = None
+    counters: Annotated[tuple[OeeCounter, ...], Field(strict=False, max_length=MAX_COUNTERS)] = Field(
+        (), alias="counter"
+    )
+
+    def sources(self) -> Iterator[TopicSource]:
+        """The topics of its counters."""
+        return (counter.source(f"counter[{n}]") for n, counter in enumerate(self.counters))
+
+    def running_values(self, rules: StateRules) -> tuple[Any, ...]:
+        """The values with which the machine produces."""
+        if self.running is not None:
+            return self.running
+        return tuple(state.value for state in rules.states if state.shape == "play")
+
+    def with_constants(self, rules: StateRules | None, interfaces: Interfaces) -> Self:
+        """The same with values in place of constants' names."""
+        if self.running is None or rules is None:
+            return self
+        running = tuple(rules.value_of(value, interfaces) for value in self.running)
+        return self.model_copy(update={"running": running})

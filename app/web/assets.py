@@ -35,8 +35,8 @@ LAYERS: Final = (
 SHARED: Final = ("entries", "marks", "facts", "alarm-rows")  # by several kinds of widgets
 ALARMS: Final = ("priorities", "alarm-line")  # of panels with alarms
 OWN_PAGES: Final = (
-    "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "stops", "diagnostics", "recipes",
-    "help", "overview", "signin", "users", "confirm", "wall",
+    "log", "alarm-rows", "alarms", "alarm-history", "alarm-report", "stops", "oee", "diagnostics",
+    "recipes", "help", "overview", "signin", "users", "confirm", "wall",
 )  # fmt: skip
 # What stylesheets of pages have in common, by the page: it comes before its own.
 COMMON: Final = {

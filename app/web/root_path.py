@@ -19,6 +19,7 @@ OWN_PATHS: Final = frozenset(
         *(
             "alarms",
             "stops",
+            "oee",
             "diagnostics",
             "recordings",
             "help",

@@ -34,6 +34,7 @@ LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "control": ("control",),
     "alarms": ("alarms", "alarm_history", "alarm_report"),
     "stops": ("stops",),
+    "oee": ("oee",),
     "recipes": ("recipes",),
     "places": ("saved_places",),
     "diagnostics": ("diagnostics",),

@@ -123,8 +123,18 @@ export class LineView {
     setText(find(this.#line, ".step-of"), steps > 1 ? `1/${steps}` : "");
     setText(this.#text("unacknowledged"), String(alarms.unacknowledged));
     setText(this.#text("active"), String(alarms.active));
+    this.#ask(alarms.asked);
     if (this.#refusedFor !== this.#shown) setText(find(this.#line, ".refused"), "");
     this.#lock();
+  }
+
+  // The question why the machine stood still, while there is no alarm: the line of the frame has it.
+  /** @param {Data | null | undefined} asked */
+  #ask(asked) {
+    const text = this.#line.querySelector(".asked");
+    if (!(text instanceof HTMLElement)) return;
+    text.hidden = find(this.#line, ".asked-key").hidden = !asked;
+    for (const name of ["text", "times"]) setText(find(text, `[data-text="${name}"]`), asked?.[name] ?? "");
   }
 
   #lock() {

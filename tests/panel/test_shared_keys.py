@@ -21,6 +21,7 @@ from app.cell.robot.map_layers import read_shape
 from app.cell.robot.maps import read_grid
 from app.cell.robot.state import RobotState
 from app.cell.robot.topics import CameraTopicState
+from app.cell.view.displays import field_state
 from app.cell.view.kinds import attributes_of
 from app.cell.view.overview import TileFigure, figure_now
 from app.panel import Panel, load_panel
@@ -323,6 +324,14 @@ ROWS: Final[Mapping[str, Row]] = {
         ),
         "state.detail[0]",
     ),
+    "counter": Row(
+        lambda keys: on_page(
+            GO,
+            state={"topic": "/s", "type": INT, "states": STATES},
+            oee={"running": [0], "counter": [{"parts": "good", **keys}]},
+        ),
+        "oee.counter[0]",
+    ),
     "readout": Row(widget("readout")),
     "indicator": Row(widget("indicator", states=STATES), type=INT),
     "figure": Row(widget("figure")),
@@ -551,6 +560,8 @@ def figure(panel: Panel, robot: RobotState, now: float) -> TileFigure:
 Known = Callable[[Panel, RobotState, float], bool]
 # Whether a table's value counts; of all others the state of the widget says it.
 KNOWN: Final[Mapping[str, Known]] = {
+    "counter": lambda panel, robot, now: panel.oee is not None
+    and field_state(panel.oee.counters[0], robot, now).state == "live",
     **dict.fromkeys(
         ("interlock", "condition"),
         lambda panel, robot, now: condition_verdict(

@@ -78,6 +78,10 @@ REFUSED: Final = {
         f'[state]\ntopic = "/s"\ntype = "std_msgs/msg/Int32"\n{STATES}\n'
         f'detail = [{{ source = "count", values = [0] }}]\n{PAGE}'
     ),
+    "oee.counter": (
+        f'[state]\ntopic = "/s"\ntype = "std_msgs/msg/Int32"\n{STATES}\n'
+        f'[oee]\nrunning = [0]\ncounter = [{{ parts = "all", source = "count" }}]\n{PAGE}'
+    ),
     "select.options_from": on_page(
         'kind = "select"\nlabel = "S"\noptions_from = { source = "count" }'
     ),

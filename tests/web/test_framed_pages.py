@@ -57,6 +57,7 @@ PAGES: Final = {
     "/recipes/{set}": ("/recipes/boxes", 200),
     "/signin": ("/signin", 200),
     "/stops": ("/stops", 200),
+    "/oee": ("/oee", 404),
     "/stops/{key}": ("/stops/alarm-1", 200),
     "/users": ("/users", 200),
     "an unknown path": ("/nothing", 404),

@@ -3,6 +3,7 @@
 import sqlite3
 from collections.abc import Iterable, Sequence
 from contextlib import closing
+from dataclasses import astuple, dataclass
 from datetime import datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
@@ -116,6 +117,11 @@ SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS states (
     seq INTEGER PRIMARY KEY AUTOINCREMENT, at REAL NOT NULL, robot TEXT NOT NULL, state TEXT NOT NULL
 );
+CREATE TABLE IF NOT EXISTS counts (
+    seq INTEGER PRIMARY KEY AUTOINCREMENT, at REAL NOT NULL, robot TEXT NOT NULL,
+    good REAL, bad REAL, count REAL
+);
+CREATE INDEX IF NOT EXISTS counts_at ON counts (robot, at);
 CREATE TABLE IF NOT EXISTS alive (robot TEXT PRIMARY KEY, at REAL NOT NULL);
 """
 
@@ -129,6 +135,20 @@ class StateRow(NamedTuple):
     state: str
 
 
+@dataclass(frozen=True, slots=True)
+class CountRow:
+    """What the counters of a robot showed at `at` (seconds since the epoch); None for not known."""
+
+    at: float
+    robot: str
+    good: float | None = None
+    bad: float | None = None
+    count: float | None = None
+
+
+COUNT_COLUMNS: Final = "at, robot, good, bad, count"
+
+
 class StatePeriod(NamedTuple):
     """From when to when a robot was in a state."""
 
@@ -137,7 +157,12 @@ class StatePeriod(NamedTuple):
     state: str
 
 
-def write_states(path: Path, rows: Sequence[StateRow], alive: Iterable[tuple[str, float]]) -> None:
+def write_states(
+    path: Path,
+    rows: Sequence[StateRow],
+    alive: Iterable[tuple[str, float]],
+    counts: Sequence[CountRow] = (),
+) -> None:
     """Adds rows, and when each robot was last looked at. LogError if the disk refuses."""
     with as_log_error():
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -146,7 +171,12 @@ def write_states(path: Path, rows: Sequence[StateRow], alive: Iterable[tuple[str
             db.executescript(SCHEMA)
             db.executemany("INSERT INTO states (at, robot, state) VALUES (?, ?, ?)", rows)
             db.executemany("INSERT OR REPLACE INTO alive VALUES (?, ?)", alive)
-            db.execute("DELETE FROM states WHERE seq <= (SELECT max(seq) FROM states) - ?", (MAX_ROWS,))
+            db.executemany(
+                f"INSERT INTO counts ({COUNT_COLUMNS}) VALUES (?, ?, ?, ?, ?)", map(astuple, counts)
+            )
+            for table in ("states", "counts"):
+                query = f"DELETE FROM {table} WHERE seq <= (SELECT max(seq) FROM {table}) - ?"
+                db.execute(query, (MAX_ROWS,))
 
 
 def close_states(path: Path) -> None:
@@ -178,3 +208,19 @@ def read_states(path: Path, robot: str, since: float, until: float) -> list[Stat
             periods.append(StatePeriod(begin, end, state))
             begun = end
     return periods
+
+
+def read_counts(path: Path, robot: str, since: float, until: float) -> list[CountRow]:
+    """What the counters of a robot showed in a time, and last before it, in the order of writing; none
+    without a file. LogError."""
+    if not path.exists() or since >= until:
+        return []
+    with as_log_error(), closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as db:
+        if not db.execute("SELECT 1 FROM sqlite_schema WHERE name = 'counts'").fetchone():
+            return []
+        rows = db.execute(
+            f"SELECT {COUNT_COLUMNS} FROM counts WHERE robot = ? AND at < ? AND at >="
+            " ifnull((SELECT max(at) FROM counts WHERE robot = ? AND at <= ?), 0) ORDER BY seq",
+            (robot, until, robot, since),
+        ).fetchall()
+    return [CountRow(*row) for row in rows]

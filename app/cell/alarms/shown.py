@@ -435,6 +435,16 @@ class PriorityCount(TypedDict):
     raised: int
 
 
+class AskedReason(TypedDict):
+    """The question why a robot stood still from `since` (seconds since the epoch) on: `text` says for
+    how long, `times` from when to when."""
+
+    robot: str
+    since: float
+    text: TextLike
+    times: TextLike
+
+
 class AlarmsView(TypedDict):
     """The section `alarms` of a view. `line` is the newest unacknowledged alarm of the highest
     priority. `standing` counts the alarms that are not normal; `active`, `unacknowledged` and `unknown`
@@ -442,7 +452,7 @@ class AlarmsView(TypedDict):
     raises since the server's start that are to be acknowledged. The shelved, suppressed and those out
     of service are counted apart. `rows` has the first `MAX_ROWS` by their ids, and `more` is how many
     follow, `more_text` the same as a sentence, "" for none. `fault`: why they are not kept on the disk,
-    "" if they are."""
+    "" if they are. `asked` is the newest stop whose reason is asked, None for none."""
 
     line: AlarmRow | None
     standing: int
@@ -458,6 +468,7 @@ class AlarmsView(TypedDict):
     more: int
     more_text: TextLike
     rows: Mapping[str, AlarmRow]
+    asked: AskedReason | None
 
 
 NO_ALARMS: Final = AlarmsView(
@@ -477,6 +488,7 @@ NO_ALARMS: Final = AlarmsView(
     more=0,
     more_text="",
     rows={},
+    asked=None,
 )
 
 
@@ -524,7 +536,7 @@ class AlarmTable:
         """The rows by their ids."""
         return self._sorted.by_id
 
-    def view(self, now: float, fault: TextLike = "") -> AlarmsView:
+    def view(self, now: float, fault: TextLike = "", asked: AskedReason | None = None) -> AlarmsView:
         """The section at `now` (monotonic seconds)."""
         rows = {row["id"]: row for row in islice(self.listed(), MAX_ROWS)}
         counts, more = self._sorted.counts, len(self.rows) - len(rows)
@@ -550,6 +562,7 @@ class AlarmTable:
             more=more,
             more_text=more_text(more),
             rows=rows,
+            asked=asked,
         )
 
 

@@ -27,6 +27,7 @@ from app.cell.alarms.shown import (
     AlarmRow,
     AlarmsView,
     AlarmTable,
+    AskedReason,
     PendingRow,
     outdated,
     row_of,
@@ -353,6 +354,7 @@ class Alarms:
         self._seq = 0
         self._overrun: dict[str, None] = {}  # ids of alarms of which a change found no room
         self._fault: TextLike = ""
+        self.asked: AskedReason | None = None  # the newest stop whose reason is asked
         self._shown = AlarmTable(AlarmMarks(panel))
         self._view: AlarmsView | None = NO_ALARMS  # None: to be made
         self._robots: list[RobotAlarms] = []
@@ -439,8 +441,14 @@ class Alarms:
     def view(self) -> AlarmsView:
         """The section of the view: what is on the disk."""
         if self._view is None:
-            self._view = self._shown.view(time.monotonic(), self._fault)
+            self._view = self._shown.view(time.monotonic(), self._fault, self.asked)
         return self._view
+
+    def ask(self, asked: AskedReason | None) -> None:
+        """Asks for the reason of a stop in the line of alarms, in place of the question before; None:
+        it is answered, or left for later."""
+        self.asked = asked
+        self._show()
 
     def rows(self) -> list[AlarmRow]:
         """All rows that are shown, the most urgent first."""

@@ -110,7 +110,7 @@ async def open_fleet(
         trends = _trend_disk(settings, panel, fleet)
         fleet.states = settings.data_folder(mode_of(settings, panel)) / STATES
         site = _site_summary(settings, panel, fleet)
-        states = StateRecorder(fleet.states, fleet.sessions) if panel.state else None
+        states = _state_recorder(fleet, fleet.states, panel)
         fleet.forward = _forward(settings, panel)
         try:
             if recordings is not None:
@@ -154,6 +154,17 @@ async def open_fleet(
                 await trends.stop()
             if recordings is not None:
                 await asyncio.to_thread(recordings.stop)
+
+
+def _state_recorder(fleet: Fleet, path: Path, panel: Panel) -> StateRecorder | None:
+    """What records the states of a panel that has them; with `[oee]` it asks for reasons."""
+    if panel.state is None:
+        return None
+    if panel.oee is None:
+        return StateRecorder(path, fleet.sessions)
+    from app.cell.session.stops import ask_reason
+
+    return StateRecorder(path, fleet.sessions, partial(ask_reason, fleet))
 
 
 def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":

@@ -23,7 +23,7 @@ from app.cell.commands.holds import HoldController
 from app.cell.commands.judge import PressGuard
 from app.cell.commands.presses import Presses
 from app.cell.commands.recipe_acts import RECIPE_ACTS, RecipeBooks, lock_of_recipe
-from app.cell.commands.shift_acts import SHIFT_ACTS
+from app.cell.commands.shift_acts import SHIFT_ACTS, needs_of_reason
 from app.cell.link.declarations import declarations
 from app.cell.link.peer import Peer, RobotAccess, RobotContext, RobotSignals
 from app.cell.link.rosout import Rosout
@@ -46,6 +46,7 @@ from app.cell.view.refresh import NoOtherRobots, OtherRobots, ViewRefresher, Vie
 from app.panel.frame_keys import needs_on_pages, shown_widgets, stops_of_several
 from app.panel.model import Panel, RobotEntry
 from app.panel.robot_panels import panel_of, widget_robots
+from app.panel.rules import OeeRules
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.trend import trends_of
 from app.records.press_record import Log, PressLog
@@ -148,7 +149,7 @@ class RobotSession:
     recipe_acts: ActRunner[RecipeBooks]
     place_acts: "PlaceActs | None"
     diagnostic_acts: ActRunner[Doctor]
-    shift_acts: ActRunner[None]
+    shift_acts: ActRunner[OeeRules | None]
     press_guard: PressGuard
     press_log: PressLog
     refresher: ViewRefresher
@@ -431,7 +432,13 @@ def wire_session(
         ),
         place_acts=_place_acts(server, robot, signals, act_context),
         diagnostic_acts=ActRunner("diagnostics", DIAGNOSTIC_ACTS, server.doctor, act_context),
-        shift_acts=ActRunner("alarm", SHIFT_ACTS, None, act_context),
+        shift_acts=ActRunner(
+            "alarm",
+            SHIFT_ACTS,
+            context.panel.oee,
+            act_context,
+            partial(needs_of_reason, context.panel.oee),
+        ),
         press_guard=press_guard,
         press_log=press_log,
         refresher=refresher,

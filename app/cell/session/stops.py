@@ -4,12 +4,30 @@ import asyncio
 from collections.abc import Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from app.cell.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow, history_rows, reading
+from app.cell.alarms.report import CountRow, read_counts, read_states
+from app.cell.alarms.shown import AskedReason
+from app.cell.commands.shift_acts import REASON_ACTION
 from app.cell.session.fleet import Fleet
 from app.cell.session.session import RobotSession
 from app.cell.stops.changes import Change, ChangeFilter, read_changes
+from app.cell.stops.oee import (
+    Answer,
+    AnsweredStop,
+    Span,
+    Spell,
+    Standstill,
+    answer_of,
+    answered,
+    break_spans,
+    spells,
+    standstills,
+    stop_key,
+    total,
+    without,
+)
 from app.cell.stops.sources import (
     STOPPING_PRIORITY,
     PanelNames,
@@ -22,11 +40,16 @@ from app.cell.stops.sources import (
     separate,
 )
 from app.cell.stops.story import AFTER_S, BEFORE_S, MOST_EVENTS, Event, Stop, StopSort, Story, story_of
+from app.cell.view.times import duration_text
 from app.records import Filter, LogRow, NullLog, OperatorLog
+from app.system.clock import format_time
 from app.system.errors import NotFound
 from app.system.texts import say
 
 MOST_STOPS: Final = 200
+KEY_S: Final = 2.0  # a state is recorded so much later than its change at most
+LOOK_BACK_S: Final = 7 * 86_400.0  # for when a standstill began
+MOST_ANSWERS: Final = 2_000
 LATE_S: Final = 5.0  # by so much the arrival of a stamped change may be later than its stamp
 FORWARD_S: Final = 86_400.0  # in which the end of a stop is looked for
 
@@ -82,11 +105,21 @@ class StopReader:
         (stop,) = alarm_stops([row._replace(priority=1)])
         return stop
 
-    async def story(self, sort: StopSort, number: int) -> Story:
-        """The story of the stop with this number. NotFound if there is no record of it."""
+    async def stop(self, sort: StopSort, number: int) -> Stop:
+        """The stop with this number. NotFound if there is no record of it."""
         stop = await self._stop(sort, number)
         if stop is None:
             raise NotFound(say("story_gone"))
+        return stop
+
+    async def key_at(self, robot: str, since: float) -> str:
+        """The key of the standstill that began at `since`; "" without one."""
+        _, stood = await self.standstills(robot, since, since + KEY_S)
+        return stood[-1].key if stood else ""
+
+    async def story(self, sort: StopSort, number: int) -> Story:
+        """The story of the stop with this number. NotFound if there is no record of it."""
+        stop = await self.stop(sort, number)
         since, until = stop.begun - BEFORE_S, max(stop.at, stop.begun) + AFTER_S + LATE_S
         names = self.names(stop.robot)
         wanted = ChangeFilter(stop.robot, since, until)
@@ -114,10 +147,50 @@ class StopReader:
         rows = await self._changes(later, MOST_EVENTS)
         return next((row.at for row in rows if row.sort == "state" and row.seq > stop.number), None)
 
+    async def standstills(
+        self, robot: str, since: float, until: float
+    ) -> tuple[list[Spell], list[AnsweredStop]]:
+        """The states of a robot from some days before a time on, and when it stood still in the time,
+        with the reasons that were given. Errors as of `stops`."""
+        panel, path = self._fleet.panel, self._fleet.states
+        if panel.oee is None or panel.state is None or path is None:
+            return [], []
+        running = panel.oee.running_values(panel.state)
+        early = since - LOOK_BACK_S
+        recorded, stood = await asyncio.to_thread(_stood, path, robot, early, until, running)
+        stood = [stop for stop in stood if stop.until > since]
+        begun = stood[0].since if stood else until
+        near = ChangeFilter(robot, begun - KEY_S, until)
+        changes = [row for row in await self._changes(near, MOST_EVENTS) if row.sort == "state"]
+        others = [
+            stop for stop in await self.stops(begun - KEY_S, until, robot) if stop.sort == "alarm"
+        ]
+        names = frozenset(map(str, running))
+        key_of = partial(stop_key, changes=changes, others=others, running=names)
+        return recorded, answered(stood, key_of, await self._answers(begun - KEY_S))
+
+    async def standstill_at(self, stop: Stop) -> AnsweredStop | None:
+        """The standstill that a stop belongs to; None without a record of one."""
+        _, stood = await self.standstills(stop.robot, stop.at - KEY_S, stop.at + FORWARD_S)
+        return next((each for each in stood if each.standstill.since <= stop.at + AFTER_S), None)
+
+    async def counts(self, robot: str, since: float, until: float) -> list[CountRow]:
+        """What its counters showed."""
+        if self._fleet.states is None:
+            return []
+        return await asyncio.to_thread(read_counts, self._fleet.states, robot, since, until)
+
+    async def _answers(self, since: float) -> list[Answer]:
+        """The newest first."""
+        answers = Filter(since=round(since * 1000), outcome="succeeded", text=REASON_ACTION)
+        rows = await self._entries(answers, MOST_ANSWERS)
+        return [answer_of(row.entry) for row in rows if row.entry.action == REASON_ACTION]
+
     async def _stop(self, sort: StopSort, number: int) -> Stop | None:
         if sort in ("state", "link"):
             rows = await self._changes(ChangeFilter(seq=number), 1)
-            stops = change_stops(self.names, (row for row in rows if row.sort == sort))
+            counts = self._fleet.panel.oee is not None
+            stops = change_stops(self.names, (row for row in rows if row.sort == sort), counts)
             return next(stops, None)
         if sort == "alarm":
             asked = await self._alarms(HistoryFilter(before=number + 1), 1)
@@ -143,6 +216,25 @@ class StopReader:
         if not isinstance(self._log, OperatorLog):
             return []
         return await self._log.rows(wanted, before, most)
+
+
+def _stood(
+    path: Path, robot: str, since: float, until: float, running: Sequence[Any]
+) -> tuple[list[Spell], list[Standstill]]:
+    recorded = spells(read_states(path, robot, since, until), running)
+    return recorded, standstills(recorded)
+
+
+def ask_reason(fleet: Fleet, robot: str, since: float, until: float) -> None:
+    """Asks why a robot stood still from `since` to `until`, unless it was short or a break."""
+    rules, span = fleet.panel.oee, Span(since, until)
+    if rules is None or not rules.reasons:
+        return
+    if total(without(span, break_spans(span, rules.breaks))) < rules.reason_after_s:
+        return
+    text = say("oee_stood_still", duration=duration_text(float(round(until - since))))
+    times = say("oee_from_to", since=format_time(since), until=format_time(until))
+    fleet.alarms.ask(AskedReason(robot=robot, since=since, text=text, times=times))
 
 
 def _read_alarms(path: Path | None, wanted: HistoryFilter, most: int) -> list[HistoryRow]:

@@ -215,10 +215,15 @@ def log_events(names: PanelNames, rows: Iterable[LogRow]) -> Iterator[Event]:
 # Stops.
 
 
-def change_stops(names: Callable[[str], PanelNames], rows: Iterable[Change]) -> Iterator[Stop]:
-    """The stops among changes: states that are stops, and lost links. `names` are those of a robot."""
+def change_stops(
+    names: Callable[[str], PanelNames], rows: Iterable[Change], every_state: bool = False
+) -> Iterator[Stop]:
+    """The stops among changes: states that are stops, and lost links. `names` are those of a robot.
+    `every_state`: any change of the state, as one of them ended production."""
     for row in rows:
-        if not row.breaks or row.sort not in ("state", "link"):
+        if row.sort not in ("state", "link") or not (
+            row.breaks or (every_state and row.sort == "state")
+        ):
             continue
         known = names(row.robot)
         text = text_in_json(row.after) if row.sort == "state" else say("story_link_lost", name="")

@@ -20,7 +20,7 @@ from app.panel.fault_catalogue import CatalogueError, read_catalogue
 from app.panel.file.wording import closest_name, known_hint, list_names, no_such
 from app.panel.model import Panel
 from app.panel.robot_panels import widget_robots
-from app.panel.rules import StateRules
+from app.panel.rules import OeeRules, StateRules
 from app.panel.shared_keys import number_key_faults
 from app.panel.template import input_ids
 from app.panel.values import number_text, same_value
@@ -141,6 +141,43 @@ def stop_faults(panel: Panel) -> Iterator[Fault]:
         if name not in known:
             message = f'no interlock, condition or alarm "{name}"; {known_hint(name, known)}'
             yield Fault(f"state.effects[{n}]", message, cause=f"interlock {name}")
+
+
+def oee_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
+    """Faults of `[oee]`: what it counts is there, and is not said twice."""
+    rules = panel.oee
+    if rules is None:
+        return
+    if panel.state is None:
+        yield Fault("oee", "counts the times of states: the panel has no [state]", cause="state oee")
+    else:
+        yield from _running_faults(rules, panel.state)
+    for n, reason in enumerate(rules.reasons):
+        if reason.id in [other.id for other in rules.reasons[:n]]:
+            yield Fault(f"oee.reason[{n}].id", f'"{reason.id}" is already the id of a reason')
+    if rules.reasons and not panel.log.enabled:
+        message = "is kept in the operator's log: leave out enabled = false in [log]"
+        yield Fault("oee.reason", message)
+    for n, counter in enumerate(rules.counters):
+        at = f"oee.counter[{n}]"
+        yield from number_faults(at, counter.type, counter.field, "a counter", interfaces)
+        if counter.parts in [other.parts for other in rules.counters[:n]]:
+            yield Fault(f"{at}.parts", f'there is already a counter of "{counter.parts}"')
+    if rules.ideal_cycle_s is not None and not rules.counters:
+        message = "needs a count of parts: add a [[oee.counter]] with parts, topic and type"
+        yield Fault("oee.ideal_cycle_s", message)
+
+
+def _running_faults(rules: OeeRules, state: StateRules) -> Iterator[Fault]:
+    """States with which the machine produces, and has not stopped."""
+    for n, value in enumerate(rules.running or ()):
+        yield from _unknown_state(f"oee.running[{n}]", value, state)
+        if any(same_value(value, stop) for stop in state.stop_values):
+            message = f"{format_value(value)} is a stop of [state]: a machine that stopped does not run"
+            yield Fault(f"oee.running[{n}]", message)
+    if not rules.running_values(state):
+        message = 'no state has the shape "play": name those that produce, such as running = ["AUTO"]'
+        yield Fault("oee" if rules.running is None else "oee.running", message)
 
 
 def _command_faults(place: str, alarm: Alarm, panel: Panel, faulty: Collection[str]) -> Iterator[Fault]:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from app.panel.checks.alarms import alarm_faults, stop_faults
+from app.panel.checks.alarms import alarm_faults, oee_faults, stop_faults
 from app.panel.checks.conditions import condition_faults_of, condition_id_faults
 from app.panel.checks.look import (
     brand_faults,
@@ -78,6 +78,8 @@ def spelling_faults(panel: Panel, widgets: Iterator[tuple[str, BaseWidget]]) -> 
     for i, alarm in enumerate(panel.alarms):
         named = (("topic", alarm.topic), ("node", alarm.node))
         names += [(f"alarm[{i}].{key}", name) for key, name in named if name]
+    for n, counter in enumerate(panel.oee.counters if panel.oee else ()):
+        names.append((f"oee.counter[{n}].topic", counter.topic))
     for place, widget in widgets:
         names += _names(place, widget)
     if not any(name.startswith(GLOBAL) for _, name in names):
@@ -151,6 +153,8 @@ def _needs(panel: Panel) -> Iterator[tuple[str, str | None]]:
         yield from ((f"page[{p}].{place}", w.needs) for place, w in placed)
     for a, alarm in enumerate(panel.alarms):
         yield f"alarm[{a}]", alarm.needs
+    if panel.oee:
+        yield "oee", panel.oee.needs
 
 
 # Checks of `demo_story`: names with other types than the story plays, or none that the panel uses.
@@ -242,6 +246,7 @@ def find_faults(
         *alarm_faults(panel, interfaces, with_faults),
         *stop_faults(panel),
         *_site_faults(panel, faulty),
+        *oee_faults(panel, interfaces),
     ]
     missed = {fault.place.partition("[")[0] for fault in ids}
     missed |= (
@@ -475,6 +480,8 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
         places.extend((f"alarm[{i}]", source) for source in alarm.sources())
         conditions = {"when": alarm.when, "while": alarm.suppressed_while}
         places.extend((f"alarm[{i}].{key}", part) for key, part in conditions.items() if part)
+    counters = panel.oee.sources() if panel.oee else ()
+    places += [(f"oee.{source.place}", source) for source in counters]
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, DisplayWidget | Command):
             at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())

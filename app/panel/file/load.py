@@ -200,6 +200,7 @@ def _resolve_constants(panel: Panel, interfaces: Interfaces, memory: CheckMemory
         "own_conditions": each("condition", panel.own_conditions, conditions),
         "alarms": alarms,
         "state": state,
+        "oee": panel.oee and panel.oee.with_constants(panel.state, interfaces),
         "frame": frame,
         "zones": (*panel.zones, *(zone for read in panel.zones_of_files for zone in read.zones)),
     }

@@ -243,8 +243,8 @@ HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
 FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
     "log", "control", "record", "demo", "robot", "source", "interlock", "alarm", "alarms", "place",
-    "diagnostics", "page", "group", "frame", "brand", "state", "detail", "widget", "qos", "confirm",
-    "options", "states", "zone", "zone_file",
+    "diagnostics", "page", "group", "frame", "brand", "state", "detail", "oee", "reason", "counter",
+    "widget", "qos", "confirm", "options", "states", "zone", "zone_file",
     *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8

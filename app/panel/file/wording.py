@@ -33,7 +33,7 @@ PATTERNS: Final[Mapping[str, str]] = {
         ),
         NO_ID,
     ),
-    **dict.fromkeys(("map", "level", "alarms", "action", "ack_command", "ack_input"), NO_ID),
+    **dict.fromkeys(("map", "level", "alarms", "action", "ack_command", "ack_input", "effects"), NO_ID),
     **dict.fromkeys(("logo", "src", "picture"), _PICTURE),
     **dict.fromkeys(("password_env", "secret_env"), _VARIABLE),
     **dict.fromkeys(("user_claim", "groups_claim"), _CLAIM),
@@ -53,6 +53,7 @@ PATTERNS: Final[Mapping[str, str]] = {
     "frame": "is not the name of a frame: it must be like map, without a slash before it",
     "map_version": "is not the version of a map: it has 16 digits, of 0-9 and a-f",
     "base_frame": "is not the name of a frame: it must be like base_link, without a slash before it",
+    "breaks": 'is not a break: it must be like "09:30-09:45"',
     "default": "has a NUL character, at which a ROS string ends",
 }
 # The elements of a list, by its key.
@@ -83,6 +84,8 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "recipe": "tables: write [[recipe]]",
     "pen": "tables: write [[page.widget.pen]]",
     "detail": "tables: write [[state.detail]]",
+    "reason": "tables: write [[oee.reason]]",
+    "counter": "tables: write [[oee.counter]]",
     "inhibits": 'ids of controls: write ["start"]',
 }
 # What the numbers of a key mean.

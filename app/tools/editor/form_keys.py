@@ -60,7 +60,7 @@ SECTIONS_BY_TABLE: Final[Mapping[str, tuple[SectionKeys, ...]]] = {
     "condition": (SectionKeys("form_section_label", ("label", "action")), _VALUE),
     "panel": (
         SectionKeys("form_section_label", ("title", "language", "languages", "stop_hint", "texts")),
-        SectionKeys("form_section_contents", ("page", "frame", "state")),
+        SectionKeys("form_section_contents", ("page", "frame", "state", "oee")),
         SectionKeys(
             "form_section_robot",
             (
@@ -150,9 +150,9 @@ LONG_TEXTS: Final = frozenset({"action", "cause", "consequence", "stop_hint", "l
 # Tables with a form of their own, opened from a list; other tables are within the form that has them.
 OPENED: Final = frozenset(
     {
-        *("page", "group", "frame", "state", "alarm", "alarms", "interlock", "condition", "source"),
-        *("recipe", "robot", "place", "zone", "zone_file", "access", "control", "log", "record"),
-        *("diagnostics", "embed", "site", "screen", "brand", "font", "demo", "texts"),
+        *("page", "group", "frame", "state", "oee", "alarm", "alarms", "interlock", "condition"),
+        *("source", "recipe", "robot", "place", "zone", "zone_file", "access", "control", "log"),
+        *("record", "diagnostics", "embed", "site", "screen", "brand", "font", "demo", "texts"),
     }
 )
 

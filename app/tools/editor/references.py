@@ -12,7 +12,8 @@ from app.panel.file.toml_lines import Path
 Tables = Mapping[str, Any]
 # What shares its ids: recipes are pressed as widgets are, interlocks and conditions are named alike.
 Group = Literal[
-    "widget", "condition", "source", "alarm", "robot", "page", "place", "zone", "role", "level"
+    "widget", "condition", "source", "alarm", "robot", "page", "place", "zone", "role", "level",
+    "reason",
 ]  # fmt: skip
 # How an id is named: as a text or in a list, as the keys of a table, as a control that may have its
 # robot before it, or between braces in a message.
@@ -37,9 +38,10 @@ OWNERS: Final[Mapping[tuple[str, ...], Group]] = {
     ("page", "group", "widget"): "widget",
     ("page", "widget", "level"): "level",
     ("page", "group", "widget", "level"): "level",
+    ("oee", "reason"): "reason",
 }
 # Each table around them has ids of its own: a copy keeps them.
-LOCAL: Final[Set[Group]] = {"level"}
+LOCAL: Final[Set[Group]] = {"level", "reason"}
 ROLES: Final = ("access", "groups")  # a list of the names themselves
 
 # "table.key" → what it names; "*" is each table. A table is called as the JSON schema calls it.

@@ -25,19 +25,21 @@ LISTS: Final[tuple[Keys, ...]] = (
     ("font",), ("robot",), ("source",), ("condition",), ("interlock",), ("alarm",), ("place",),
     ("zone",), ("zone_file",), ("recipe",), ("page",), ("page", "widget"), ("page", "group"),
     ("page", "group", "widget"), ("frame", "widget"), ("state", "detail"),
+    ("oee", "reason"), ("oee", "counter"),
     ("page", "widget", "column"), ("page", "widget", "pen"),
     ("page", "group", "widget", "column"), ("page", "group", "widget", "pen"),
 )  # fmt: skip
 SINGLE: Final[tuple[Keys, ...]] = (
     ("texts",), ("screen",), ("brand",), ("log",), ("diagnostics",), ("control",), ("access",),
     ("access", "oidc"), ("embed",), ("site",), ("record",), ("robot", "overview"), ("state",),
-    ("demo",), ("alarms",), ("alarms", "mqtt"), ("frame",), ("recipe", "parameters"),
+    ("oee",), ("demo",), ("alarms",), ("alarms", "mqtt"), ("frame",), ("recipe", "parameters"),
     ("recipe", "readback"),
 )  # fmt: skip
 # Of the tables at the top of a new file.
 ORDER: Final = (
     "texts", "font", "screen", "brand", "log", "diagnostics", "control", "access", "embed",
-    "site", "record", "robot", "state", "source", "condition", "interlock", "alarms", "alarm", "place",
+    "site", "record", "robot", "state", "oee", "source", "condition", "interlock", "alarms", "alarm",
+    "place",
     "zone", "zone_file", "recipe", "frame", "page", "demo",
 )  # fmt: skip
 

@@ -20,6 +20,7 @@ from app.tools.simulator.values import (
     UNITS,
     Signal,
     Span,
+    counted,
     cycle,
     fixed,
     get,
@@ -129,6 +130,8 @@ class _Field:
             return FieldSignal(self._path, self._permitting(interlocks), prompt=True)
         if self._entry.values:
             return self._with(cycle(self._entry.values, self._round_s))
+        if (counts_s := self._counts_s) and not self._limits:
+            return self._with(counted(counts_s, self._kind.name))
         if (raising := machine.raising(key)) and not self._limits:
             return FieldSignal(self._path, self._permitting(raising, raising=True), prompt=True)
         if not self._limits and field_call(self._path) is not None:
@@ -145,6 +148,11 @@ class _Field:
             return field
         first = field.signal(0.0)
         return replace(field, signal=fixed(False if isinstance(first, bool) else first), moving=False)
+
+    @property
+    def _counts_s(self) -> float | None:
+        """In which time it rises by one; None for what is no counter."""
+        return next((field.counts_s for field in self._shown if field.counts_s), None)
 
     @property
     def _values(self) -> tuple[Any, ...]:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from app.panel.constants import parent_type, resolve_names
 from app.panel.numbers import scaling_beside
 from app.panel.response_text import response_paths
-from app.panel.rules import MachineState
+from app.panel.rules import MachineState, OeeRules
 from app.panel.widgets.alarm_views import AlarmView
 from app.panel.widgets.displays import (
     Camera,
@@ -78,6 +78,20 @@ def _of_field(source: TopicField) -> DisplayedField:
     return DisplayedField(
         topic=source.topic, type=source.type, field=source.field, max_age_s=source.max_age_s
     )
+
+
+COUNT_S: Final = 12.0  # in which a part is made where the panel file has no ideal cycle
+GOOD_SHARE: Final = 50  # of so many parts one is bad
+
+
+def counters_of(rules: OeeRules | None) -> Iterator[DisplayedField]:
+    """The counters of `[oee]`: a part in a little more than the ideal cycle."""
+    if rules is None:
+        return
+    cycle_s = (rules.ideal_cycle_s or COUNT_S) * 1.2
+    for counter in rules.counters:
+        share = GOOD_SHARE if counter.parts == "bad" else 1
+        yield replace(_of_field(counter), counts_s=cycle_s * share)
 
 
 def _readout(readout: Readout, interfaces: Interfaces) -> Iterator[DisplayedField]:

@@ -14,7 +14,8 @@ DEFAULT_QOS: Final = TopicQos()
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DisplayedField:
     """A field that the panel shows. `low` and `high` are limits of the number in the message, `values`
-    the values that the widget distinguishes. Times `scale` plus `offset` the number has the `unit`."""
+    the values that the widget distinguishes. Times `scale` plus `offset` the number has the `unit`. It
+    rises by one each `counts_s` seconds."""
 
     topic: str
     type: str
@@ -27,6 +28,7 @@ class DisplayedField:
     high: float | None = None
     values: tuple[Any, ...] = ()
     max_age_s: float | None = None
+    counts_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

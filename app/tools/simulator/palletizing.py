@@ -219,6 +219,7 @@ LIGHT_S: Final = 0.4  # until the lamp reports what it was switched to
 HOUR_S: Final = 3600.0
 FIRST_BOXES: Final = 87
 FIRST_PALLET: Final = 11
+BOXES_FOR_A_REJECT: Final = 90
 FIRST_RATE: Final = 1148  # boxes in the hour before
 SPEED_MM_S: Final = 120.0
 
@@ -292,6 +293,11 @@ class PalletizingCell:
     @property
     def shift_boxes(self) -> int:
         return (self.pallet - 1) * BOXES + self.boxes
+
+    @property
+    def rejects(self) -> int:
+        """Boxes of the shift that were sorted out: a damaged one now and then."""
+        return self.shift_boxes // BOXES_FOR_A_REJECT
 
     @property
     def left_s(self) -> float:
@@ -579,6 +585,7 @@ ROWS: Final[Mapping[str, CellTopic]] = {
     ),
     "/cell/rate": CellTopic(lambda cell: cell.rate),
     "/cell/shift_boxes": CellTopic(lambda cell: cell.shift_boxes),
+    "/cell/rejects": CellTopic(lambda cell: cell.rejects),
     "/guard_locked": CellTopic(lambda cell: not cell.door.is_open),
     "/cell/no_fault": CellTopic(lambda cell: cell.state is not State.FAULT),
     "/cell/air_enough": CellTopic(lambda cell: cell.air.is_enough),

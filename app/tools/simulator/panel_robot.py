@@ -30,7 +30,7 @@ from app.ros.messages.names import Qos
 from app.system.errors import DecodeError, FieldError
 from app.system.texts import render
 from app.tools.simulator.fields import FieldSignal, PanelFields
-from app.tools.simulator.kinds import needs_of
+from app.tools.simulator.kinds import counters_of, needs_of
 from app.tools.simulator.known_types import (
     Message,
     Moment,
@@ -485,7 +485,7 @@ class PanelRobot:
             name: kind for name, kind in _reference_topics(panel).items() if name not in of_story
         }
         skipped = {**self._own, **of_story, EVENTS: EVENT_TYPE}
-        shown = _needs_of(needs, DisplayedField)
+        shown = [*_needs_of(needs, DisplayedField), *counters_of(panel.oee)]
         machine = Machine(panel)
         for topic in self._own.keys() & {ENABLED}:
             machine.read((topic, "data"), lambda _: self._demo.permits)

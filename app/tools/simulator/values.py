@@ -182,6 +182,13 @@ def cycle(values: Sequence[Any], period_s: float | None = None, phase: float = 0
     return lambda t: values[int((t / each_s + phase * len(values)) % len(values))]
 
 
+def counted(each_s: float, name: str) -> Signal:
+    """Counts the parts of a machine that makes one in so many seconds, in a field of a base type; it
+    begins at zero again where the type has no higher number."""
+    rounds = INTEGER_RANGES[name][1] + 1 if name in INTEGER_RANGES else 2**53
+    return as_type(lambda t: int(t / each_s) % rounds, name)
+
+
 def fixed(value: Any) -> Signal:
     return lambda _: value
 

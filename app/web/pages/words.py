@@ -128,6 +128,7 @@ TREND_WORDS: Final = (
 )
 ALARM_WORDS: Final = (
     "alarm_line",
+    "oee_reason",
     "alarm_none",
     "alarms_unheard",
     "alarm_none_unacknowledged",

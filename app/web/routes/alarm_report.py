@@ -174,12 +174,17 @@ def report_context(
         form=form,
         typed=printable_texts(form.model_dump()),
         shifts=[
-            (say(SHIFT_WORDS[back]), _span(shift_at(now, panel.alarm_rules.shifts, back)), name, chosen)
+            (
+                say(SHIFT_WORDS[back]),
+                span_text(shift_at(now, panel.alarm_rules.shifts, back)),
+                name,
+                chosen,
+            )
             for back, name in enumerate(SHIFTS)
             for chosen in [name == form.shift and not form.has_times]
         ],
         robots={str(robot.id): robot.name for robot in panel.robots},
-        span=_span(shift),
+        span=span_text(shift),
         figures=list(_figures(parts.figures, len(presses))),
         states=list(_durations(parts.states, fills)),
         periods=[
@@ -231,7 +236,8 @@ def _message(rows: Iterable[LogRow]) -> ShownMessage | None:
     )
 
 
-def _span(shift: Shift) -> Text:
+def span_text(shift: Shift) -> Text:
+    """From when to when a shift is."""
     since, until = (datetime.fromtimestamp(at) for at in shift)
     end = (
         time_of_day(until.strftime("%H:%M"))

@@ -10,21 +10,27 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.cell.commands.press import PRESS_ID
 from app.cell.session.stops import StopReader
+from app.cell.stops.oee import SAME_S
 from app.cell.stops.sources import PanelNames, panel_alarm
 from app.cell.stops.story import Event, Line, Stop, StopSort, Story
 from app.cell.view.times import duration_text
+from app.panel.rules import OeeReason
 from app.system.clock import format_datetime, format_time, iso_time
 from app.system.errors import NotFound
+from app.system.printable import printable
 from app.system.texts import Text, TextLike, joined, localized, number, render, say
 from app.system.texts.locales import MINUS
+from app.web.acts import ActBody, act_responses, said_of, sent_act
+from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
 from app.web.pages.alarms import word as alarm_word
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import day_name, who_of
 from app.web.pages.log_words import word as log_word
-from app.web.requests import errors
+from app.web.requests import SINCE, TEXT, FormFields, described_body, errors
 
 router = APIRouter()
 
@@ -49,11 +55,13 @@ class StopsQuery(BaseModel):
 
 
 class StoryQuery(BaseModel):
-    """`all`: every line, not only those that tell most."""
+    """`all`: every line, not only those that tell most. `act` is the id of an act whose receipt is
+    shown."""
 
     model_config = ConfigDict(extra="forbid")
 
     all: Literal["", "1"] = ""
+    act: Annotated[str, Field(max_length=400)] = ""
 
 
 class AlarmQuery(BaseModel):
@@ -63,6 +71,29 @@ class AlarmQuery(BaseModel):
 
     id: Annotated[str, Field(max_length=300)]
     occurrence: Annotated[int, Field(ge=0, lt=2**53)]
+
+
+REASON_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "reason": TEXT, "_since": SINCE})
+
+
+class ReasonBody(ActBody):
+    """The id of the reason in the panel file; "" is "later". The same `id` again is the same act."""
+
+    reason: Annotated[str, Field(max_length=64)] = ""
+
+
+class ReasonReceipt(ActAnswer):
+    """The receipt: `reason` is "" where it was done, `code` is its stable name."""
+
+
+class AskedStop(NamedTuple):
+    """The keys by which the reason of a stop is given; `chosen` is the id of the newest, `answer` says
+    who gave it. `refused`: why an act was refused."""
+
+    keys: Sequence[OeeReason]
+    chosen: str
+    answer: TextLike
+    refused: TextLike
 
 
 class ShownStop(NamedTuple):
@@ -110,9 +141,15 @@ class StoryContext(TypedDict):
     order: TextLike
     left_out: TextLike
     to_do: ToDo
+    asked: AskedStop | None
     alarm_word: Any
     log_word: Any
     word: Any
+    figures_word: Any
+
+
+def word_of_figures(name: str, **about: Any) -> Text:
+    return say(f"oee_{name}", **about)
 
 
 def word(name: str, **about: Any) -> Text:
@@ -166,6 +203,50 @@ async def of_alarm(state: CurrentState, query: Annotated[AlarmQuery, Query()]) -
 
 
 @router.get(
+    "/stops/asked",
+    summary="To the story of the stop whose reason is asked, or else to the list",
+    responses=errors(403, 422, 429, 503),
+    status_code=303,
+    response_class=RedirectResponse,
+)
+async def asked(state: CurrentState) -> Response:
+    question = state.fleet.alarms.asked
+    key = ""
+    if question is not None:
+        key = await _reader(state).key_at(question["robot"], question["since"])
+    path = f"/stops/{key}#reasons" if key else "/stops"
+    return RedirectResponse(f"{state.root}{path}", status_code=303)
+
+
+@router.post(
+    "/stops/{key}/reason",
+    response_model=ReasonReceipt,
+    summary="Say why the machine stood still, or leave it for later",
+    responses=act_responses(ReasonReceipt),
+    openapi_extra=described_body(ReasonBody, REASON_FORM.schema, required=False),
+)
+async def give_reason(request: Request, state: CurrentState, key: Key) -> Response:
+    sent = await sent_act(request, state, ReasonBody, REASON_FORM)
+    reader = _reader(state)
+    stop = await reader.stop(*_sort_and_number(key))
+    stood = await reader.standstill_at(stop)
+    if stood is None or not stood.key:
+        raise NotFound(word_of_figures("no_stop"))
+    began, reason = iso_time(stood.standstill.since), sent.body.reason
+    values = {"stop": stood.key, "began": began} | ({"reason": reason} if reason else {})
+    asked = sent.asked("reason" if reason else "later", stood.key, values)
+    session = state.fleet.of_robot(stop.robot)
+    receipt = await sent.run(session.shift_acts, asked, sent.act_id(reason or "later"))
+    question = state.fleet.alarms.asked
+    if receipt.done and question and abs(question["since"] - stood.standstill.since) <= SAME_S:
+        state.fleet.alarms.ask(None)
+    answer = sent.answer(receipt, f"{state.root}/stops/{key}")
+    if "location" in answer.headers:
+        answer.headers["location"] += "#reasons"
+    return answer
+
+
+@router.get(
     "/stops/{key}",
     response_class=HTMLResponse,
     summary="Why the machine stopped: what changed in the minute before, and what was first",
@@ -180,9 +261,9 @@ async def story_page(
     names = reader.names(story.stop.robot)
     page = FramedPage("stop.html", word("title"), f"/stops/{key}", "alarms")
     language = caller_of(request).language
-    return framed_page(
-        request, state, page, story_context(story, end, names, bool(query.all), language)
-    )
+    asked = await _asked(state, reader, story.stop, query.act)
+    context = story_context(story, end, names, bool(query.all), language, asked)
+    return framed_page(request, state, page, context)
 
 
 @router.get(
@@ -200,6 +281,24 @@ async def story_json(request: Request, state: CurrentState, key: Key) -> JSONRes
 
 def _reader(state: AppState) -> StopReader:
     return StopReader(state.fleet, state.log)
+
+
+async def _asked(state: AppState, reader: StopReader, stop: Stop, act: str) -> AskedStop | None:
+    """The keys of a stop; None where its reason can't be given."""
+    rules = state.fleet.panel.oee
+    if rules is None or not rules.reasons:
+        return None
+    stood = await reader.standstill_at(stop)
+    if stood is None or not stood.key:
+        return None
+    refused = said_of(act, [session.shift_acts for session in state.fleet.sessions])
+    newest = stood.answer
+    answer: TextLike = ""
+    if newest is not None:
+        label = next((r.label for r in rules.reasons if r.id == newest.reason), newest.reason)
+        who, at = who_of(printable(newest.who)), format_time(newest.at)
+        answer = word_of_figures("given", reason=label, who=who, time=at)
+    return AskedStop(rules.reasons, stood.reason, answer, refused)
 
 
 def _to(state: AppState, stop: Stop | None) -> Response:
@@ -226,7 +325,12 @@ def _by_day(stops: Sequence[Stop]) -> Iterator[tuple[Text, list[ShownStop]]]:
 
 
 def story_context(
-    story: Story, end: float | None, names: PanelNames, is_whole: bool, language: str
+    story: Story,
+    end: float | None,
+    names: PanelNames,
+    is_whole: bool,
+    language: str,
+    asked: AskedStop | None = None,
 ) -> StoryContext:
     """The page of a story; `end` is when the stop was over, None while it is not known to be."""
     short = story.short()
@@ -244,9 +348,11 @@ def story_context(
         order=word("by_stamps" if story.by_stamps else "by_arrival"),
         left_out=word("left_out", count=number(f"{story.left_out:,d}")) if story.left_out else "",
         to_do=to_do(story, names, language),
+        asked=asked,
         alarm_word=alarm_word,
         log_word=log_word,
         word=word,
+        figures_word=word_of_figures,
     )
 
 

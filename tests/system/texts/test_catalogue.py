@@ -30,6 +30,7 @@ PREFIXES = (
     "diagnostics_",
     "finding_",
     "look_",
+    "oee_",
     "users_page_",
     "users_page_new_",
     "users_page_remove_",

@@ -1,0 +1,183 @@
+"""Reasons of stops and the figures of a shift, of a running server: the question after a stop, the
+answer and its change, the figures as a page, JSON and CSV."""
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+from tests.support.users import Browsers, add_user
+
+PIN: Final = "2580"
+# It stands still for 2 s of 8.
+PANEL = """
+title = "Cell"
+languages = ["en", "ja"]
+[state]
+topic = "/state"
+type = "std_msgs/msg/String"
+states = [
+  { value = "RUNNING", text = "Running", shape = "play" },
+  { value = "WAITING", text = { en = "Waiting", ja = "待ち" }, shape = "pause" },
+]
+[oee]
+reason_after_s = 1.0
+ideal_cycle_s = 0.2
+counter = [
+  { parts = "all", topic = "/parts", type = "std_msgs/msg/UInt32" },
+  { parts = "bad", topic = "/rejects", type = "std_msgs/msg/UInt32" },
+]
+reason = [
+  { id = "material", label = { en = "Material", ja = "材料" }, icon = "package" },
+  { id = "break", label = "Break", planned = true },
+]
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Empty"
+message = {}
+interlock = "ready"
+[[interlock]]
+id = "ready"
+topic = "/ready"
+[[alarm]]
+id = "speed_low"
+topic = "/speed"
+type = "std_msgs/msg/Float64"
+text = "Belt is slow"
+low = 5.0
+priority = 3
+[demo]
+"/state" = { period_s = 8, values = ["RUNNING", "RUNNING", "RUNNING", "WAITING"] }
+"/speed" = { values = [8.0] }
+"""
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """It has stood still twice at least."""
+    with demo_server(tmp_path_factory.mktemp("cell"), PANEL) as server:
+        until(lambda: len(ended(server)) > 1, "the machine has stood still", within_s=40)
+        yield server
+
+
+def figures(server: Server) -> dict[str, Any]:
+    answer = server.http.get("/oee/figures")
+    assert answer.status_code == 200, answer.text
+    told: dict[str, Any] = answer.json()
+    return told
+
+
+def ended(server: Server) -> list[dict[str, Any]]:
+    return [stop for stop in figures(server)["stops"] if stop["ended"] and stop["key"]]
+
+
+def give(server: Server, key: str, reason: str) -> dict[str, Any]:
+    answer = server.http.post(f"/stops/{key}/reason", json={"reason": reason})
+    receipt: dict[str, Any] = answer.json()
+    return {**receipt, "status": answer.status_code}
+
+
+def test_the_figures_are_of_what_was_recorded(cell: Server) -> None:
+    until(lambda: figures(cell)["produced_quantity"], "parts are counted")
+    told = figures(cell)
+    assert 0 < told["availability"] < 1
+    stops = sum(stop["seconds"] for stop in told["stops"])
+    assert told["actual_unit_down_time_s"] == pytest.approx(stops)
+    assert told["planned_busy_time_s"] == pytest.approx(stops + told["actual_production_time_s"])
+    parts = (told["availability"], told["performance"], told["quality"])
+    assert told["oee"] == pytest.approx(parts[0] * parts[1] * parts[2])
+    assert told["not_recorded_s"] > 0
+
+
+def test_the_line_of_alarms_asks_after_the_restart(cell: Server) -> None:
+    line = re.compile(r'class="asked" role="status"><b data-text="text">Stood still for [^<]+<')
+    until(lambda: line.search(cell.http.get("/").text), "the panel asks", within_s=20)
+    answer = cell.http.get("/stops/asked")
+    assert answer.status_code == 303
+    path, _, fragment = answer.headers["location"].partition("#")
+    assert fragment == "reasons"
+    page = cell.http.get(path, headers={"accept-language": "ja"}).text
+    assert "<b>材料</b>" in page
+    assert "未回答" in page
+    key = path.removeprefix("/stops/")
+    assert give(cell, key, "")["outcome"] == "succeeded"
+    asked = cell.http.get("/stops/asked").headers["location"]
+    assert key not in asked
+
+
+def test_an_answer_counts_until_it_is_changed(cell: Server) -> None:
+    key = ended(cell)[0]["key"]
+    for reason in ("material", "break", "material"):
+        assert give(cell, key, reason)["outcome"] == "succeeded"
+        page = cell.http.get(f"/stops/{key}").text
+        assert re.findall(r'name="reason" value="(\w+)" aria-pressed="true"', page) == [reason]
+        counted = {stop["key"]: stop["reason"] for stop in figures(cell)["stops"]}
+        assert counted.get(key) == (None if reason == "break" else reason)
+    assert figures(cell)["planned_stops_s"] == pytest.approx(0.0, abs=0.01)
+    log = cell.http.get("/log", params={"text": "Material"}).text
+    assert "Reason of a stop" in log
+
+
+def test_the_page_and_the_table_have_the_stops(cell: Server) -> None:
+    stop = ended(cell)[0]
+    page = cell.http.get("/oee").text
+    assert f'href="/stops/{stop["key"]}"' in page
+    assert 'data-kind="running"' in page
+    rows = list(csv.DictReader(io.StringIO(cell.http.get("/oee/stops.csv").text.lstrip("\ufeff"))))
+    assert stop["key"] in [row["key"] for row in rows]
+    last = cell.http.get("/oee", params={"shift": "last"}).text
+    assert "No state is recorded in this time." in last
+
+
+def test_a_form_answers_with_the_page_of_the_stop(cell: Server) -> None:
+    key = ended(cell)[1]["key"]
+    form = {"id": "form-1", "reason": "material"}
+    answer = cell.http.post(f"/stops/{key}/reason", data=form)
+    assert (answer.status_code, answer.headers["location"]) == (303, f"/stops/{key}#reasons")
+    assert "Material, by" in cell.http.get(f"/stops/{key}").text
+    refused = cell.http.post(f"/stops/{key}/reason", data={"id": "form-2", "reason": "luck"})
+    shown = cell.http.get(refused.headers["location"]).text
+    assert "This reason is not in the panel file." in shown
+
+
+def test_what_is_no_reason_is_refused(cell: Server) -> None:
+    receipt = give(cell, ended(cell)[0]["key"], "luck")
+    assert (receipt["outcome"], receipt["code"]) == ("refused", "oee_reason_unknown")
+    assert give(cell, "state-999999", "material")["status"] == 404
+
+
+def test_who_may_not_answer_is_told_why(tmp_path: Path) -> None:
+    panel = PANEL.replace("[oee]", '[oee]\nneeds = "maintenance"')
+    add_user(tmp_path, "ann", "operator", pin=PIN)
+    browsers = Browsers()
+    with demo_server(tmp_path, panel, KIOSK_DATA=str(tmp_path)) as server, closing(browsers):
+        ann = browsers.signed_in(server.url, "ann", pin=PIN)
+
+        def keys() -> list[str]:
+            told = ann.get("/oee/figures").json()
+            return [stop["key"] for stop in told["stops"] if stop["key"]]
+
+        until(keys, "the machine has stood still", within_s=20)
+        answer = ann.post(f"/stops/{keys()[0]}/reason", json={"reason": "material"})
+        assert answer.json()["code"] == "role_needed"
+
+
+def test_without_the_table_there_is_no_page(tmp_path: Path) -> None:
+    begin, rest = PANEL.split("[oee]")
+    panel = begin + rest[rest.index("[[page]]") :]
+    with demo_server(tmp_path, panel) as server:
+        assert server.http.get("/oee").status_code == 404
+        assert 'href="/oee"' not in server.http.get("/alarms", headers={"accept": "text/html"}).text
