@@ -34,7 +34,7 @@ run: .venv/run .venv/bin/operator-panel
 
 # A panel in another folder: `KIOSK_PANEL=… make dev`.
 WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))
-WATCHED += $(patsubst %,'--reload-include=*.%',toml json json5 html css js po msg srv action)
+WATCHED += $(patsubst %,'--reload-include=*.%',toml json json5 html css js po msg srv action sql)
 dev: .venv/test
 	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload $(WATCHED)
 

@@ -28,6 +28,7 @@ PATTERNS = (
     "*.msg",
     "*.srv",
     "*.action",
+    "*.sql",
 )
 RELOAD = ["--reload", *(f"--reload-dir={name}" for name in FOLDERS)]
 RELOAD += [f"--reload-include={pattern}" for pattern in PATTERNS]

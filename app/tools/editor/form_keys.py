@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from app.panel.roles import ROLES
+from app.panel.widgets.displays import Readout
 from app.panel.widgets.families import Command, Input, PressCommand
 from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.service_action import Action
@@ -415,6 +416,7 @@ REFERENCES: Final[Mapping[str, Names]] = {
     "alarm.ack_input": _widgets_of(Input),
     "alarm.inhibits": _widgets_of(Command),
     "alarm.state": _words_of_the_state,
+    "site.figures": _widgets_of(Readout),
     "state.stops": _words_of_the_state,
     "state.effects": _listed("interlock", "condition", "alarm"),
     "alarm_list.group": _alarm_groups,

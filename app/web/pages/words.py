@@ -62,6 +62,7 @@ WORDS: Final = (
     "menu",
     "whole",
     "close",
+    "story_title",
     "phone",
     "cancel",
     "robots",

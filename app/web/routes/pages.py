@@ -58,6 +58,7 @@ OTHER_PAGES = (
     "_look.html",
     "wall.html",
     "manual.html",
+    "proof.html",
 )
 
 
