@@ -53,6 +53,7 @@ OTHER_PAGES = (
     "alarm-report.html",
     "stops.html",
     "stop.html",
+    "oee.html",
     "diagnostics.html",
     "_diagnostics.html",
     "_look.html",

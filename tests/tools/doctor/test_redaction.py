@@ -47,10 +47,10 @@ from tests.tools.doctor.secrets import NUMBER, SECRET, secrets_in
 # All marked fields, by their names. A new one is public only if it is added here, too.
 OF_PANEL_FILES: Final = """
     ack_command ack_input action active alarms by code condition conditions confirm_s connect
-    demo_heals_s depth domain duration_s effects every_s fault field fields figures groups id info
-    interlocks key language languages level map max_age_s message namespace needs node page
-    parameter_types parameters period_s places progress robot rows same screens service span stale_s
-    success takeover_after_s text timeout_s topic topics type within_s
+    demo_heals_s depth domain duration_s effects every_s fault field fields figures groups id
+    ideal_cycle_s info interlocks key language languages level map max_age_s message namespace needs
+    node page parameter_types parameters period_s places progress reason_after_s robot rows same
+    screens service span stale_s success takeover_after_s text timeout_s topic topics type within_s
 """
 OF_OTHERS: Final[dict[type, str]] = {
     Settings: "hosts proxies log_level without take_panel",
