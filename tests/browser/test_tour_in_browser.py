@@ -110,7 +110,7 @@ def test_without_scripts_the_tour_is_a_list_and_is_sent(shuttle: Server, page: P
         widget(plain, "drive_round").locator("button[type=submit]").first.click()
         return bool(shuttle.widget("drive_round")["busy"])
 
-    until(is_sent, "it is sent: not before the page is there for a while")
+    until(is_sent, "it is sent: not before the page is there for a while", every_s=1.5)
     assert shuttle.http.post("/widgets/drive_round/cancel", json={}).status_code == 200
     until(lambda: not shuttle.widget("drive_round")["busy"], "it is canceled")
     context.close()
