@@ -52,6 +52,8 @@ class PageView:
         """SettingsError if there is no browser."""
         flags = (*FLAGS, "--no-sandbox") if os.geteuid() == 0 else FLAGS
         self._program = find_browser("")
+        profile.mkdir(parents=True, exist_ok=True)
+        self._env = {**os.environ, "TMPDIR": str(profile)}  # what it leaves goes with its profile
         self._browser = Browser(self._program, flags, profile)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(
@@ -76,7 +78,7 @@ class PageView:
         if self._url:
             self._run(self._browser.open(url))
         else:
-            self._run(self._browser.start(url, os.environ))
+            self._run(self._browser.start(url, self._env))
         self._url = url
 
     def seen(self, control: str) -> Seen:
