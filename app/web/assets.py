@@ -41,7 +41,7 @@ OWN_PAGES: Final = (
 # What stylesheets of pages have in common, by the page: it comes before its own.
 COMMON: Final = {
     "signin": ("forms", "pad"), "users": ("forms",), "recipes": ("forms",), "confirm": ("pad",),
-    "wall": ("priorities",),
+    "wall": ("priorities",), "alarm-report": ("paper",), "stops": ("paper",), "oee": ("paper",),
 }  # fmt: skip
 GALLERY: Final = "gallery"  # not in the installed package
 EDITOR: Final = "editor"  # the folder of its scripts, style and templates, which no panel has

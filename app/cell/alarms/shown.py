@@ -61,6 +61,11 @@ PRIORITY_WORDS: Final = (
 PANEL: Final = "panel"  # the source of the panel's own alarms
 
 
+def panel_id(alarm_id: str) -> str:
+    """The id in the panel file of an alarm of a robot, or of one that the robot publishes."""
+    return alarm_id.partition(":")[0].partition("@")[0]
+
+
 class TakenOutRow(TypedDict):
     """A shelf, or out of service: `who` did it, `since` and `until` are RFC 3339; "" for no end."""
 

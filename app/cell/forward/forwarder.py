@@ -36,9 +36,9 @@ MEASURE_EVERY_S: Final = 10.0
 SETTLE_S: Final = 1.0  # by then, what was there is on the disk
 HEALTH_EVERY_S: Final = 60.0
 REMOVE_EVERY_S: Final = 600.0
-SLOW_S: Final = 5.0  # a commit that takes longer is told
+SLOW_S: Final = 5.0  # a longer commit is reported
 LONGEST_REST_S: Final = 1.0
-ALIVE_S: Final = 10.0  # at least so often the status is told
+ALIVE_S: Final = 10.0  # the longest time between two reports of the status
 MOST_SLICES: Final = 20  # batches of one stream before the others have their turn
 REMOVED: Final = "removed in the cell before it was sent"
 REFUSED: Final = "refused by the database: "
@@ -132,7 +132,7 @@ class Forwarder:
 
     @contextmanager
     def _tolerating(self) -> Iterator[None]:
-        """A store that can't be read or written is told; the other streams go on."""
+        """A store that can't be read or written is reported; the other streams go on."""
         try:
             yield
         except LogError as error:
@@ -373,13 +373,13 @@ def run(settings: str, folder: str, server: int) -> Iterator[str]:
     """Forwards for ever; yields the status as JSON when it has changed, and now and then. KioskError if
     it can't begin."""
     forwarder = Forwarder(read_forward(Path(settings)), Path(folder), server=server, rests=True)
-    told, told_at = "", 0.0
+    sent, sent_at = "", 0.0
     try:
         while True:
             forwarder.step()
             text = forwarder.status.as_json()
-            if text != told or time.monotonic() - told_at >= ALIVE_S:
-                told, told_at = text, time.monotonic()
+            if text != sent or time.monotonic() - sent_at >= ALIVE_S:
+                sent, sent_at = text, time.monotonic()
                 yield text
             time.sleep(forwarder.pause_s)
     finally:

@@ -129,8 +129,8 @@ class PanelReceiver(PanelTaker):
             asyncio.get_running_loop().call_later(RESTART_AFTER_S, self._restart)
 
     async def follow_trial(self, in_flight: InFlight) -> None:
-        """After a start: what came of the last take goes to the log; a panel with which the server runs
-        for `TRIAL_S` stays."""
+        """After a start: the result of the last take goes to the log; a panel with which the server
+        runs for `TRIAL_S` stays."""
         take = await asyncio.to_thread(self.disk.last)
         if take is not None and take.phase == "trial":
             await asyncio.sleep(TRIAL_S)
@@ -153,7 +153,7 @@ class PanelReceiver(PanelTaker):
                 new_entry("panel", origin, values, text, action=f"panel_{take.phase}", outcome=outcome)
             )
         except LogError as error:
-            log.warning("what came of a sent panel is not in the operator's log: %s", error)
+            log.warning("the result of a sent panel is not in the operator's log: %s", error)
 
     def _unlock(self) -> None:
         for session in self._fleet.sessions:
@@ -175,7 +175,7 @@ class PanelReceiver(PanelTaker):
 
 
 def outcome_text(take: Take) -> TextLike:
-    """What came of a take, as a sentence."""
+    """The result of a take, as a sentence."""
     old, new, name = short(take.old), short(take.new), take.who
     if take.phase == "kept":
         return say("panel_kept", old=old, new=new, name=name)

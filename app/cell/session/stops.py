@@ -16,12 +16,16 @@ from app.cell.stops.changes import Change, ChangeFilter, read_changes
 from app.cell.stops.oee import (
     Answer,
     AnsweredStop,
+    Plan,
+    ShiftFigures,
     Span,
     Spell,
     Standstill,
     answer_of,
     answered,
     break_spans,
+    quantities,
+    shift_figures,
     spells,
     standstills,
     stop_key,
@@ -135,8 +139,12 @@ class StopReader:
             *log_events(names, [row for row in reversed(entries) if row.entry.robot in ("", robot)]),
         ]
         rules = self._fleet.panel.state
-        left_out = sum(len(rows) >= MOST_EVENTS for rows in (changes, alarms, entries))
-        return story_of(stop, events, frozenset(rules.effects) if rules else (), left_out)
+        return story_of(
+            stop,
+            events,
+            frozenset(rules.effects) if rules else (),
+            are_complete=all(len(rows) < MOST_EVENTS for rows in (changes, alarms, entries)),
+        )
 
     async def end_of(self, stop: Stop) -> float | None:
         """When a state that is a stop was over, in seconds since the epoch; None while it is not, and
@@ -235,6 +243,30 @@ def ask_reason(fleet: Fleet, robot: str, since: float, until: float) -> None:
     text = say("oee_stood_still", duration=duration_text(float(round(until - since))))
     times = say("oee_from_to", since=format_time(since), until=format_time(until))
     fleet.alarms.ask(AskedReason(robot=robot, since=since, text=text, times=times))
+
+
+async def figures_of(
+    fleet: Fleet, log: OperatorLog | NullLog, robot: str, since: float, until: float
+) -> ShiftFigures:
+    """The figures of a robot ("" for the first) from `since` on and before `until`, in seconds since
+    the epoch. LogError if the stores can't be read, TooMany if too many searches run."""
+    reader, span = StopReader(fleet, log), Span(since, until)
+    entry = fleet.of_robot(robot).entry
+    name = entry.id if entry else ""
+    recorded, stops = await reader.standstills(name, since, until)
+    rows = await reader.counts(name, since, until)
+    rules, states = fleet.panel.oee, fleet.panel.state
+    if rules is None or states is None:
+        return shift_figures(span, [], [], quantities([], (), span), Plan(()))
+    plan = Plan(
+        rules.running_values(states),
+        rules.breaks,
+        rules.reason_after_s,
+        rules.ideal_cycle_s,
+        frozenset(reason.id for reason in rules.reasons if reason.planned),
+    )
+    quantity = quantities(rows, [counter.parts for counter in rules.counters], span)
+    return shift_figures(span, recorded, stops, quantity, plan)
 
 
 def _read_alarms(path: Path | None, wanted: HistoryFilter, most: int) -> list[HistoryRow]:

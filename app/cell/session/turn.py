@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from app.cell.alarms.engine import AlarmEngine
 from app.cell.alarms.published import AlarmEntry
-from app.cell.alarms.shown import AlarmRow
+from app.cell.alarms.shown import AlarmRow, panel_id
 from app.cell.alarms.sources import link_state
 from app.cell.alarms.states import AlarmInstance
 from app.cell.commands.confirmations import Confirmations
@@ -213,11 +213,6 @@ class RobotAlarms:
             return locked("alarm_inhibits", name=name)
         reason = say("alarm_inhibits_action", name=name, action=action)
         return Verdict(False, "alarm_inhibits", reason)
-
-
-def panel_id(alarm_id: str) -> str:
-    """The id in the panel file of an alarm of a robot, or of one that the robot publishes."""
-    return alarm_id.partition(":")[0].partition("@")[0]
 
 
 def _stands(row: AlarmRow) -> bool:

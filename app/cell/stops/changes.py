@@ -265,7 +265,6 @@ class ChangeJournal:
     only."""
 
     def __init__(self) -> None:
-        self.left_out = 0  # changes that came too often
         self._path: Path | None = None
         self._waiting: deque[Change] = deque(maxlen=MAX_WAITING)
         self._buckets = TokenBuckets(PER_VALUE)
@@ -277,7 +276,6 @@ class ChangeJournal:
         """Records a change, unless the same value changes too often."""
         name = (change.robot, change.sort, change.id)
         if not self._buckets.has_token(name):
-            self.left_out += 1
             return
         self._buckets.take_token(name)
         self._waiting.append(change)

@@ -281,7 +281,7 @@ def counted(rows: Sequence[CountRow], name: str, span: Span) -> Counted | None:
 
 class Quantities(NamedTuple):
     """The produced and the good quantity, None for not known, and the spans in which all that is
-    counted was recorded. `parts` are those for which performance is told: the good ones where nothing
+    counted was recorded. `parts` are those for which performance is given: the good ones where nothing
     else is counted."""
 
     produced: float | None

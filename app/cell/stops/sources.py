@@ -9,8 +9,9 @@ from typing import Final
 
 from app.cell.alarms.history import HistoryRow
 from app.cell.alarms.records import text_of, written_limit, written_value
+from app.cell.alarms.shown import panel_id
 from app.cell.stops.changes import Change, text_in_json
-from app.cell.stops.story import AFTER_S, Event, Source, Stop
+from app.cell.stops.story import AFTER_S, Event, Sort, Source, Stop
 from app.panel.alarm import Alarm
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
@@ -36,10 +37,11 @@ ALARM_WORDS: Final[Mapping[str, str]] = {
     "unknown": "story_alarm_unknown",
 }
 TOLD_FIRST: Final[Mapping[str, int]] = {"state": 1, "interlock": 2, "condition": 3}
-CONTROL_KINDS: Final[Mapping[str, str]] = {
-    "control": "story_control",
-    "recipe": "story_recipe",
-    "began": "story_server_began",
+# Kinds of entries without a control: the sort of the event, and the code of its text.
+CONTROL_KINDS: Final[Mapping[str, tuple[Sort, str]]] = {
+    "control": ("control", "story_control"),
+    "recipe": ("recipe", "story_recipe"),
+    "began": ("server", "story_server_began"),
 }
 
 
@@ -96,11 +98,6 @@ def alarm_sources(alarm: Alarm) -> frozenset[Source]:
     return frozenset(values)
 
 
-def panel_alarm(alarm_id: str) -> str:
-    """The id in the panel file of an alarm of a robot, or of one that the robot publishes."""
-    return alarm_id.partition(":")[0].partition("@")[0]
-
-
 # Events.
 
 
@@ -109,13 +106,13 @@ def change_events(names: PanelNames, changes: Iterable[Change]) -> Iterator[Even
     then on: they are about the same values. A message that changes several tells the machine's state,
     or else an interlock, before conditions of the same value."""
     rows = list(changes)
-    told: set[tuple[float, frozenset[Source]]] = set()
+    changed: set[tuple[float, frozenset[Source]]] = set()
     for row in sorted(rows, key=lambda row: (row.at, TOLD_FIRST.get(row.sort, 0))):
         if row.sort in TOLD_FIRST:
             sources = _change_sources(names, row, ())
-            if sources and (row.at, sources) in told:
+            if sources and (row.at, sources) in changed:
                 continue
-            told.add((row.at, sources))
+            changed.add((row.at, sources))
         together = [other for other in rows if other.sort == "publisher" and other.at == row.at]
         yield Event(
             row.at,
@@ -161,7 +158,7 @@ def alarm_events(names: PanelNames, rows: Iterable[HistoryRow]) -> Iterator[Even
         if row.event != "raised" and row.event not in ALARM_WORDS:
             continue
         record = json.loads(row.record)
-        alarm = names.alarms.get(panel_alarm(row.id))
+        alarm = names.alarms.get(panel_id(row.id))
         is_raise = row.event == "raised"
         text = text_of(record.get("about", {}).get("text", row.id))
         yield Event(
@@ -192,10 +189,9 @@ def log_events(names: PanelNames, rows: Iterable[LogRow]) -> Iterator[Event]:
         at = (row.pressed_at or entry.at) / 1000
         by, reason = printable(entry.who), entry.reason_text
         if entry.kind in CONTROL_KINDS:
-            sort = "server" if entry.kind == "began" else entry.kind
-            text = say(CONTROL_KINDS[entry.kind])
+            sort, code = CONTROL_KINDS[entry.kind]
             detail = "" if sort == "server" else reason
-            yield Event(entry.at / 1000, sort, entry.action, text, detail, by=by)  # type: ignore[arg-type]
+            yield Event(entry.at / 1000, sort, entry.action, say(code), detail, by=by)
             continue
         if not entry.widget:
             continue

@@ -96,7 +96,7 @@ class Stop(NamedTuple):
         return self.at if self.sent is None else self.sent
 
 
-Why = Literal["none_named", "same_moment", "restarted"]
+Why = Literal["none_named", "same_moment", "restarted", "too_many"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class Line:
 class Story:
     """`first` is the first cause; None where it can't be told, and `why` says why. `tied` are then
     those that were first together. `by_stamps`: all that was compared has stamps of the robot.
-    `left_out` events are not in `lines`, as there were too many."""
+    `is_complete`: all that changed is in `lines`; else those nearest the stop are."""
 
     stop: Stop
     lines: tuple[Line, ...]
@@ -121,7 +121,7 @@ class Story:
     why: Why | None
     tied: tuple[Event, ...] = ()
     by_stamps: bool = False
-    left_out: int = 0
+    is_complete: bool = True
 
     @property
     def zero(self) -> float:
@@ -164,8 +164,8 @@ class Story:
 
         def rank(line: Line) -> tuple[bool, bool, float]:
             event = line.event
-            told = event.breaks or event.sort in ("state", "goal", "press", "refused")
-            return not line.is_first, not told, abs(line.offset_s)
+            matters = event.breaks or event.sort in ("state", "goal", "press", "refused")
+            return not line.is_first, not matters, abs(line.offset_s)
 
         chosen = sorted(self.lines, key=rank)[:most]
         return tuple(line for line in self.lines if line in chosen)
@@ -175,41 +175,47 @@ UNTOLD: Final[dict[Why, str]] = {
     "none_named": "story_untold",
     "same_moment": "story_untold_together",
     "restarted": "story_untold_restarted",
+    "too_many": "story_untold_too_many",
 }
 
 
 def story_of(
-    stop: Stop, events: Iterable[Event], effects: Collection[str] = (), left_out: int = 0
+    stop: Stop,
+    events: Iterable[Event],
+    effects: Collection[str] = (),
+    *,
+    are_complete: bool = True,
 ) -> Story:
     """The story of a stop, from what changed around it. `effects` are ids of what only follows from a
-    stop, as the panel file says."""
+    stop, as the panel file says. If the events are not complete, what was first can't be told."""
     begun = stop.begun
     within = [e for e in events if begun - BEFORE_S <= e.begun <= begun + AFTER_S]
     ordered = sorted(within, key=lambda event: event.begun)
-    if len(ordered) > MOST_EVENTS:
-        kept = sorted(ordered, key=lambda event: abs(event.begun - begun))[:MOST_EVENTS]
-        left_out += len(ordered) - MOST_EVENTS
-        ordered = sorted(kept, key=lambda event: event.begun)
     chain = causes(stop, ordered, effects)
     tied = _first_together(chain)
     first = _named_best(tied) if tied else None
     why: Why | None = None
-    if any(e.sort == "server" and e.begun >= begun - GAP_S for e in ordered if e.begun <= begun):
+    if not are_complete:
+        first, tied, why = None, (), "too_many"
+    elif any(e.sort == "server" and begun - GAP_S <= e.begun <= begun for e in ordered):
         first, tied, why = None, (), "restarted"
     elif not tied:
         why = "none_named"
     elif first is None:
         why = "same_moment"
-    compared = chain or tied
     zero = first.begun if first else begun
+    nearest = sorted(ordered, key=lambda event: abs(event.begun - begun))[:MOST_EVENTS]
     return Story(
         stop,
-        tuple(Line(event, event.begun - zero, event is first, event.begun < zero) for event in ordered),
+        tuple(
+            Line(event, event.begun - zero, event is first, event.begun < zero)
+            for event in sorted(nearest, key=lambda event: event.begun)
+        ),
         first,
         why,
         () if first else tied,
-        bool(compared) and all(event.sent is not None for event in compared),
-        left_out,
+        bool(chain) and all(event.sent is not None for event in chain),
+        are_complete and len(ordered) <= MOST_EVENTS,
     )
 
 

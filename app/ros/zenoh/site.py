@@ -122,7 +122,7 @@ class SummaryPublisher(_Client):
         ]
 
     def put(self, payload: bytes) -> None:
-        """Sends it now, and to whoever asks from now on. Lost without a router: the next one has
+        """Sends it now, and to each query from now on. Lost without a router: the next one has
         all."""
         self._latest = payload
         if self._publisher is not None:

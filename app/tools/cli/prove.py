@@ -41,11 +41,11 @@ def _prove(options: Namespace) -> int:
     panel = load_panel(path)
     shows = sys.stderr.isatty()
 
-    def told(result: Result) -> None:
+    def show(result: Result) -> None:
         if shows:
             print("✗" if result.fault else "·", end="", file=sys.stderr, flush=True)
 
-    proof = prove(panel, told, with_browser=not options.no_browser)
+    proof = prove(panel, show, with_browser=not options.no_browser)
     if shows:
         print(file=sys.stderr)
     key = None

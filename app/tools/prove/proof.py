@@ -56,7 +56,7 @@ OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of the
 
 
 class Result(NamedTuple):
-    """A case with what came out: `fault` is "" where it holds. `took_s` is how long the page took to
+    """A case with its result: `fault` is "" where it holds. `took_s` is how long the page took to
     show it, or a hold to stop, None where nothing was timed. `shown` is the reason on the page."""
 
     kind: str  # "control", "hold" or "alarm"
@@ -87,7 +87,7 @@ class Proof:
 
 
 def prove(
-    panel: Panel, told: Callable[[Result], None] = lambda _: None, *, with_browser: bool = True
+    panel: Panel, on_result: Callable[[Result], None] = lambda _: None, *, with_browser: bool = True
 ) -> Proof:
     """The proof of a panel with one robot; `with_browser`: its pages are looked at in Chromium too, if
     there is one. KioskError if the panel can't be served."""
@@ -103,7 +103,7 @@ def prove(
     def tell(result: Result) -> None:
         with lock:
             proof.results.append(result)
-        told(result)
+        on_result(result)
 
     looks = bool(proof.browser) and not panel.control.required  # the proof's own client has control
 

@@ -48,7 +48,7 @@ STARTED_WITHIN_S: Final = 30.0
 ANSWER_WITHIN_S: Final = 10.0
 POLL_S: Final = 0.01
 KEPT_EVERY_S: Final = 1.0
-QUICK: Final = Cost(8, 1)  # of a secret that nobody knows
+QUICK: Final = Cost(8, 1)  # of a secret that no one has to know
 PACE_S: Final = 0.022  # between two presses: a client may press 50 times in a second
 
 
@@ -144,7 +144,7 @@ class Rig:
     def _serve(self) -> None:
         try:
             asyncio.run(self._serve_until_end())
-        except Exception as error:  # told to the thread that waits for the start
+        except Exception as error:  # for the thread that waits for the start
             self._fault = error
 
     async def _serve_until_end(self) -> None:
@@ -179,7 +179,6 @@ class Rig:
                 app, log_level="error", timeout_graceful_shutdown=1, lifespan="off", **OPTIONS
             )
             self._server = uvicorn.Server(config)
-            self._server.install_signal_handlers = lambda: None  # type: ignore[attr-defined]
             await self._server.serve(sockets=[listening])
             fleet.close()
 

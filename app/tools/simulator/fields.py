@@ -151,7 +151,7 @@ class _Field:
 
     @property
     def _counts_s(self) -> float | None:
-        """In which time it rises by one; None for what is no counter."""
+        """In which time it rises by one; None for a field that is not a counter."""
         return next((field.counts_s for field in self._shown if field.counts_s), None)
 
     @property

@@ -88,7 +88,7 @@ class ManualControl(NamedTuple):
 
 
 class ManualPage(NamedTuple):
-    """A page, the frame or the page of recipes; `shown` are the labels of what is no control."""
+    """A page, the frame or the page of recipes; `shown` are the labels of all but controls."""
 
     title: TextLike
     role: TextLike

@@ -10,7 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.cell.alarms.records import text_of
 from app.cell.alarms.report import Shift, shift_at
-from app.cell.session.oee import figures_of
+from app.cell.session.stops import figures_of
 from app.cell.stops.oee import NOT_ANSWERED, SHORT, ReasonTime, ShiftFigures, StopTime, state_text
 from app.cell.view.times import duration_text
 from app.panel.rules import OeeRules
@@ -118,7 +118,7 @@ class StopAnswer(BaseModel):
 
 class ReasonAnswer(BaseModel):
     """How long and how often the machine stood still for a reason; `share` is that of it and all above
-    it, from 0 to 1. `reason` is "" for stops that nobody has answered, "-" for short ones."""
+    it, from 0 to 1. `reason` is "" for stops without an answer, "-" for short ones."""
 
     reason: str
     text: str

@@ -37,7 +37,7 @@ class Controller(BaseModel):
 
 
 class LastTake(BaseModel):
-    """The last panel file that was taken, and what came of it. `trial`: the server runs with it, and
+    """The last panel file that was taken, and the result. `trial`: the server runs with it, and
     takes it back if it ends within some seconds. Hashes are of the panel file with its files."""
 
     phase: Literal["writing", "trial", "kept", "restored"]

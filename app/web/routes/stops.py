@@ -4,17 +4,18 @@ import time
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from itertools import groupby
-from typing import Annotated, Any, Final, Literal, NamedTuple, TypedDict
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_args
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.cell.alarms.shown import panel_id
 from app.cell.commands.press import PRESS_ID
 from app.cell.session.stops import StopReader
 from app.cell.stops.oee import SAME_S
-from app.cell.stops.sources import PanelNames, panel_alarm
-from app.cell.stops.story import Event, Line, Stop, StopSort, Story
+from app.cell.stops.sources import PanelNames
+from app.cell.stops.story import MOST_EVENTS, Event, Line, Stop, StopSort, Story
 from app.cell.view.times import duration_text
 from app.panel.rules import OeeReason
 from app.system.clock import format_datetime, format_time, iso_time
@@ -35,7 +36,8 @@ from app.web.requests import SINCE, TEXT, FormFields, described_body, errors
 router = APIRouter()
 
 DAYS_S: Final = 7 * 86_400.0  # that the list goes back
-KEY: Final = r"^(state|alarm|goal|link)-[1-9][0-9]{0,17}$"
+STOP_SORTS: Final[tuple[StopSort, ...]] = get_args(StopSort)
+KEY: Final = rf"^({'|'.join(STOP_SORTS)})-[1-9][0-9]{{0,17}}$"
 # The icon of each sort of event.
 SIGNS: Final = {
     "state": "arrow-right", "interlock": "lock", "condition": "circle-dot", "alarm": "",
@@ -308,7 +310,7 @@ def _to(state: AppState, stop: Stop | None) -> Response:
 
 def _sort_and_number(key: str) -> tuple[StopSort, int]:
     sort, _, written = key.partition("-")
-    return sort, int(written)  # type: ignore[return-value]  # the path's pattern has the sorts
+    return next(each for each in STOP_SORTS if each == sort), int(written)  # the pattern has them
 
 
 def _by_day(stops: Sequence[Stop]) -> Iterator[tuple[Text, list[ShownStop]]]:
@@ -346,7 +348,7 @@ def story_context(
         these=word("these", count=count),
         every=word("all", count=every),
         order=word("by_stamps" if story.by_stamps else "by_arrival"),
-        left_out=word("left_out", count=number(f"{story.left_out:,d}")) if story.left_out else "",
+        left_out="" if story.is_complete else word("left_out", count=number(f"{MOST_EVENTS:,d}")),
         to_do=to_do(story, names, language),
         asked=asked,
         alarm_word=alarm_word,
@@ -394,7 +396,7 @@ def to_do(story: Story, names: PanelNames, language: str) -> ToDo:
 def advice_of(event: Event, names: PanelNames) -> tuple[TextLike, TextLike] | None:
     """What the panel file says to do about an event, and its picture."""
     if event.sort == "alarm":
-        alarm = names.alarms.get(panel_alarm(event.id))
+        alarm = names.alarms.get(panel_id(event.id))
         return (alarm.action, alarm.picture or "") if alarm and alarm.action else None
     if event.sort not in ("interlock", "condition"):
         return None
@@ -427,7 +429,7 @@ def story_answer(story: Story, end: float | None, language: str) -> dict[str, An
         "not_told": story.why,
         "ordered_by": "stamps" if story.by_stamps else "arrival",
         "zero": iso_time(story.zero),
-        "left_out": story.left_out,
+        "complete": story.is_complete,
         "lines": [
             {
                 "offset_s": round(line.offset_s, 3),

@@ -141,7 +141,7 @@ def test_a_summary_passes_to_a_wall_at_another_router(client: Callable[..., Clie
         answers = wall.session.get(summary_key(), timeout=5.0)
         return [answer.ok.payload.to_bytes() for answer in answers if answer.ok]
 
-    until(lambda: whole() == [payload("line 2", "cell 1")], "the whole, to whoever asks")
+    until(lambda: whole() == [payload("line 2", "cell 1")], "the whole, to a query")
 
 
 def test_a_cell_sees_no_other_cell_and_publishes_only_its_own(client: Callable[..., Client]) -> None:

@@ -122,7 +122,7 @@ def test_a_panel_publishes_what_its_pages_show(
         shown = cell.http.get("/alarms").json()["alarms"]
         assert read.alarm_list[0].since == next(a["since"] for a in shown if a["id"] == "air")
         assert listener.alive == {alive_key("line 2", "cell 1"): True}
-        # The whole, for whoever asks.
+        # The whole, for a query.
         answers = listener.session.get("operator-panel/**", timeout=5.0)
         assert [json.loads(a.ok.payload.to_bytes())["cell"] for a in answers if a.ok] == ["cell 1"]
     until(lambda: not listener.alive[alive_key("line 2", "cell 1")], "its token is gone")

@@ -6,6 +6,8 @@ import pytest
 
 from app.cell.stops.story import BEFORE_S, MOST_EVENTS, Event, Stop, story_of
 
+pytestmark = pytest.mark.promise("stops")
+
 GUARD, AIR, BOX, MODE = ("/guard", "data"), ("/air", "data"), ("/box", "data"), ("/state", "data")
 AT = 1_000.0  # of each stop
 
@@ -154,11 +156,16 @@ def test_a_flood_is_cut_and_counted() -> None:
     flood = [
         event(-BEFORE_S + 1 + n * 1e-3, "press", f"p{n}", breaks=False) for n in range(MOST_EVENTS + 7)
     ]
-    story = story_of(stop(), [*flood, event(-0.5)], left_out=3)
+    story = story_of(stop(), [*flood, event(-0.5)])
     assert len(story.lines) == MOST_EVENTS
-    assert story.left_out == 3 + 8
+    assert not story.is_complete
     assert story.first is not None
     assert story.first.id == "guard"
+
+
+def test_what_was_first_is_not_told_where_a_store_had_more_than_was_read() -> None:
+    story = story_of(stop(), [event(-0.5)], are_complete=False)
+    assert (story.first, story.why, story.is_complete) == (None, "too_many", False)
 
 
 def test_the_short_story_keeps_the_first_cause_and_the_order() -> None:
