@@ -1,7 +1,7 @@
 // The panes "Robot" and "Parts": live values, search, and adding by a drag to the page or by Enter.
 import { emptyPlace, placeAt, pointOf } from "./arrange.js";
 import { dropOfNew, showMark } from "./change.js";
-import { fill, onPane } from "./panes.js";
+import { fill, focusAgain, onPane } from "./panes.js";
 import { shownPage } from "./preview.js";
 import { select, selection } from "./selection.js";
 import { add, get, part } from "./wire.js";
@@ -53,6 +53,7 @@ async function refresh() {
 // Adds a line of a pane; an item of the robot is asked about first, at the point where it is.
 /** @param {HTMLElement} item @param {Target} target @param {{ x: number, y: number }} point */
 async function addItem(item, target, point) {
+  const pane = left.contains(item) ? left : form;
   const near = selection();
   const place = { at: emptyPlace(), ...target, near, page: shownPage() };
   if (item.dataset.kindOf) {
@@ -68,7 +69,7 @@ async function addItem(item, target, point) {
   ask.onclose = async () => {
     ask.className = "";
     if (ask.returnValue) chosen(await add({ ...place, section, key, choice: Number(ask.returnValue) }));
-    else item.focus();
+    else focusAgain(pane, item);
   };
   ask.showModal();
   const { width, height } = ask.getBoundingClientRect();

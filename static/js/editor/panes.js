@@ -69,10 +69,22 @@ function keepPlace(pane) {
   return () => {
     const area = pane.querySelector(".scroll, .fault-list, pre, .form");
     if (area) area.scrollTop = scrolled;
-    if (!named?.name) return;
-    const same = [...pane.querySelectorAll(named.tag)].find((element) => nameOf(element).name === named.name);
-    if (same instanceof HTMLElement) same.focus({ preventScroll: true });
+    if (named) focusNamed(pane, named);
   };
+}
+
+/** @param {HTMLElement} pane @param {{ tag: string, name: string }} named */
+function focusNamed(pane, named) {
+  if (!named.name) return;
+  const same = [...pane.querySelectorAll(named.tag)].find((element) => nameOf(element).name === named.name);
+  if (same instanceof HTMLElement) same.focus({ preventScroll: true });
+}
+
+// The focus goes back to what opened a question, or to what took its place when the pane was filled meanwhile.
+/** @param {HTMLElement} pane @param {HTMLElement} opener */
+export function focusAgain(pane, opener) {
+  if (opener.isConnected) opener.focus();
+  else focusNamed(pane, nameOf(opener));
 }
 
 /** @param {Element} element */

@@ -143,6 +143,17 @@ def test_words_filter_the_list_and_escape_adds_nothing(desk: Page, running: Edit
     assert written(running) == before
 
 
+def test_escape_finds_the_line_in_a_list_that_came_again_meanwhile(desk: Page) -> None:
+    line = item(desk, "robot", "/load")
+    line.press("Enter")
+    expect(desk.locator(".ways")).to_be_visible()
+    shown = line.element_handle()
+    desk.route("**/robot", lambda route: route.fulfill(json={"values": {}, "rows": -1}))
+    wait(desk, lambda: not shown.evaluate("line => line.isConnected"), "the list comes again")
+    desk.keyboard.press("Escape")
+    expect(line).to_be_focused()
+
+
 def test_the_robots_values_leave_the_pane_that_was_chosen_meanwhile(desk: Page) -> None:
     item(desk, "robot", "/load")
     held: list[Route] = []
