@@ -94,6 +94,23 @@ export function feelTouches() {
     addEventListener(name, released, true);
 }
 
+// A drag that an element makes of its own, sideways only or every way. Else Chromium takes a quick one for a throw, and the next
+// tap, on a button, only for the end of it.
+/** @param {HTMLElement} element @param {"every" | "sideways"} way */
+export function keepDrags(element, way) {
+  let [x, y] = [0, 0];
+  element.addEventListener("touchstart", ({ touches: [first] }) => ([x, y] = [first.clientX, first.clientY]), {
+    passive: true,
+  });
+  /** @param {TouchEvent} event */
+  const keep = (event) => {
+    const [first] = event.touches;
+    const isSideways = Math.abs(first.clientX - x) > Math.abs(first.clientY - y);
+    if ((way === "every" || isSideways) && event.cancelable) event.preventDefault();
+  };
+  element.addEventListener("touchmove", keep, { passive: false });
+}
+
 // A bar code or badge reader is a keyboard that types faster than a hand. Its keys press, hold and choose nothing; its code
 // goes to the field that asks for one, or is said to be not asked for. What a key presses waits until it is known that
 // it came alone.

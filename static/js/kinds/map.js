@@ -1,5 +1,6 @@
 // A map: tiles of its picture in one transform, the robot over them. Fingers, the wheel and keys move and enlarge it.
 import { closest, find } from "../show.js";
+import { keepDrags } from "../touches.js";
 
 /** @typedef {{ x: number, y: number, yaw: number, resolution: number }} Placed */
 /** @typedef {Placed & { version: string, width: number, height: number }} Grid */
@@ -124,8 +125,7 @@ export class MapView {
     view.addEventListener("pointermove", (event) => this.#move(event));
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
       view.addEventListener(name, (event) => this.#up(/** @type {PointerEvent} */ (event).pointerId));
-    // Else Chromium takes a quick drag for a throw, and the next tap, on a button, only for the end of it.
-    view.addEventListener("touchmove", (event) => event.preventDefault(), { passive: false });
+    keepDrags(view, "every");
     view.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     view.addEventListener("keydown", (event) => this.#key(event));
     find(root, ".map-keys").addEventListener("click", ({ target }) => this.#do(closest(target, "button")?.dataset.do));

@@ -1,6 +1,7 @@
 // A trend, with the columns of its pens and its cursor. `trend/plot.js` draws it.
 import { numberText } from "../number-text.js";
 import { closest, find } from "../show.js";
+import { keepDrags } from "../touches.js";
 import { duration, Plot } from "../trend/plot.js";
 
 // The columns of a trend's pen: [number, lowest, highest, last, whether it begins a line].
@@ -48,6 +49,7 @@ class Cursor {
     const point = (event) => this.#point((event.clientX - area.getBoundingClientRect().left) / area.clientWidth);
     area.addEventListener("pointerdown", point);
     area.addEventListener("pointermove", (event) => event.buttons && point(event));
+    keepDrags(area, "sideways");
     area.addEventListener("keydown", (event) => this.#key(event));
   }
 
