@@ -11,7 +11,7 @@ from tests.support.browser.pages import place, widget
 from tests.support.parts import Server
 from tests.support.servers import demo_server
 
-pytestmark = pytest.mark.promise("press")
+pytestmark = pytest.mark.promise("fingers")
 
 PANEL: Final = """
 title = "Drags"
