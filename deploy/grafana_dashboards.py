@@ -57,6 +57,16 @@ def rows_of(table: str, alias: str) -> str:
     )
 
 
+def pens_rows(table: str) -> str:
+    """The rows `t` of a table of trends, with their pens `n`, in the time and of what is chosen."""
+    return (
+        f"FROM operator_panel.{table} t JOIN operator_panel.pen n ON n.panel = t.panel"
+        f" AND n.generation = t.generation AND n.number = t.pen {JOIN.format('t')}"
+        f" WHERE $__timeFilter(t.at) AND {CHOSEN}"
+        " AND n.topic || ' ' || n.field IN (${field:sqlstring})"
+    )
+
+
 RAISED: Final = f"{rows_of('alarm', 'a')} AND a.event = 'raised'"
 PER_10_MIN: Final = (
     "SELECT $__timeGroup(a.at, '10m') AS span, p.name AS cell, count(*) AS raised"
@@ -328,7 +338,8 @@ DASHBOARDS: Final = (
     Dashboard(
         name="trends",
         title="Trends",
-        about="A value a minute: lowest, highest and mean. The seconds are in the cell.",
+        about="A value a minute: lowest, highest and mean. The seconds are in the cell, until"
+        " operator-panel central ask has asked for them.",
         since="now-24h",
         variables={
             "field": "SELECT DISTINCT topic || ' ' || field FROM operator_panel.pen ORDER BY 1"
@@ -341,10 +352,7 @@ DASHBOARDS: Final = (
                 width=24,
                 query="SELECT $__timeGroup(t.at, $__interval) AS time,"
                 f" p.name || ' ' || n.robot || n.topic AS metric, {column}"
-                " FROM operator_panel.trend t JOIN operator_panel.pen n ON n.panel = t.panel"
-                f" AND n.generation = t.generation AND n.number = t.pen {JOIN.format('t')}"
-                f" WHERE $__timeFilter(t.at) AND {CHOSEN}"
-                " AND n.topic || ' ' || n.field IN (${field:sqlstring}) GROUP BY 1, 2 ORDER BY 1",
+                f" {pens_rows('trend')} GROUP BY 1, 2 ORDER BY 1",
                 )
                 for title, column in (
                     ("Mean", "sum(t.mean * t.count) / sum(t.count) AS mean"),
@@ -359,10 +367,24 @@ DASHBOARDS: Final = (
                 query="SELECT p.name AS cell, n.robot, n.topic, n.field, min(t.low) AS lowest,"
                 " sum(t.mean * t.count) / sum(t.count) AS mean, max(t.high) AS highest,"
                 " count(*) AS minutes"
-                " FROM operator_panel.trend t JOIN operator_panel.pen n ON n.panel = t.panel"
-                f" AND n.generation = t.generation AND n.number = t.pen {JOIN.format('t')}"
-                f" WHERE $__timeFilter(t.at) AND {CHOSEN}"
-                " AND n.topic || ' ' || n.field IN (${field:sqlstring}) GROUP BY 1, 2, 3, 4 ORDER BY 1",
+                f" {pens_rows('trend')} GROUP BY 1, 2, 3, 4 ORDER BY 1",
+            ),
+            View(
+                title="Details that were asked for",
+                kind="timeseries",
+                width=24,
+                about="The last value of each second or ten, where a cell has sent them",
+                query="SELECT t.at AS time, p.name || ' ' || n.robot || n.topic AS metric, t.last"
+                f" {pens_rows('trend_detail')} ORDER BY 1",
+            ),
+            View(
+                title="Requests for details",
+                kind="table",
+                width=24,
+                query="SELECT p.name AS cell, array_to_string(r.pens, ', ') AS pens, r.since, r.until,"
+                " r.asked_by, r.asked_at, r.status, r.rows, r.reason"
+                f" FROM operator_panel.detail_request r {JOIN.format('r')} WHERE {CHOSEN}"
+                " ORDER BY r.id DESC LIMIT 100",
             ),
         ),
     ),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 from app.cell.forward.config import ConnectionConfig
 from app.cell.forward.cursors import Position
+from app.cell.forward.details import Detail, KnownPen, Request
 from app.cell.forward.spool import Cursor, Pen
 from app.cell.forward.streams import Mark, Stream, StreamRow, time_of
 from app.system.errors import KioskError, os_error_text
@@ -20,7 +21,9 @@ from app.system.texts import TextLike, number, say
 if TYPE_CHECKING:
     import psycopg
 
-SCHEMA_VERSION: Final = 1  # of app/tools/central/sql
+SCHEMA_VERSION: Final = 2  # of app/tools/central/sql
+LEAST_VERSION: Final = 1  # that takes the rows; from DETAILS_VERSION on there are requests for details
+DETAILS_VERSION: Final = 2
 CONNECT_S: Final = 10
 STATEMENT_S: Final = 120  # then the server is taken for one that does not answer
 SILENT_S: Final = 30  # of a connection whose packets are not acknowledged
@@ -94,6 +97,7 @@ class Centre:
         self._address = config.address
         self._db = connect(config)
         self._panel = 0
+        self.has_requests = False
 
     def close(self) -> None:
         with suppress(Exception):
@@ -104,14 +108,15 @@ class Centre:
         with self._errors(panel):
             row = self._db.execute("SELECT version, written_from FROM operator_panel.about").fetchone()
             version, written_from = row or (0, 0)
-            if not written_from <= SCHEMA_VERSION <= version:
+            if version < LEAST_VERSION or written_from > SCHEMA_VERSION:
                 raise CentreError(
                     say(
                         "forward_other_version",
                         version=number(str(version)),
-                        own=number(str(SCHEMA_VERSION)),
+                        own=number(str(LEAST_VERSION)),
                     )
                 )
+            self.has_requests = version >= DETAILS_VERSION
             row = self._db.execute(
                 "SELECT operator_panel.register(%s, %s, %s)", (panel, site, key)
             ).fetchone()
@@ -165,6 +170,49 @@ class Centre:
                 self._insert_rows(batch)
         last = batch.rows[-1].seq if batch.rows else max((gap[1] for gap in batch.gaps), default=0)
         return Cursor(batch.generation, last)
+
+    def requests(self) -> list[Request]:
+        """The open requests for details, the oldest first."""
+        with self._errors():
+            rows = self._db.execute(
+                "SELECT id, pens, since, until, asked_by FROM operator_panel.open_requests(%s)",
+                (self._panel,),
+            ).fetchall()
+        return [
+            Request(number, tuple(pens), since.timestamp(), until.timestamp(), asked_by)
+            for number, pens, since, until, asked_by in rows
+        ]
+
+    def known_pens(self) -> list[KnownPen]:
+        """The pens whose minutes the centre has."""
+        with self._errors():
+            rows = self._db.execute(
+                "SELECT generation, number, robot, topic, type, field"
+                " FROM operator_panel.known_pens(%s)",
+                (self._panel,),
+            ).fetchall()
+        return [KnownPen(generation, Pen(*pen)) for generation, *pen in rows]
+
+    def send_details(self, known: KnownPen, details: Sequence[Detail]) -> None:
+        """Writes values of a pen in one transaction. Those that the centre has already are left."""
+        values: list[list[Any]] = [[time_of(round(detail.at * 1000)) for detail in details]]
+        values += [list(column) for column in zip(*(detail[1:] for detail in details), strict=True)]
+        with self._errors(), self._db.transaction():
+            self._execute(
+                "INSERT INTO operator_panel.trend_detail"
+                " (panel, generation, pen, at, width, low, high, last) SELECT %s, %s, %s, * FROM"
+                " unnest(%s::timestamptz[], %s::integer[], %s::float8[], %s::float8[], %s::float8[])"
+                " ON CONFLICT DO NOTHING",
+                (self._panel, known.generation, known.pen.number, *values),
+            )
+
+    def settle(self, request: Request, status: str, reason: str, rows: int) -> None:
+        """Ends a request: `status` is "done" or "refused", `rows` how many values were sent."""
+        with self._errors():
+            self._execute(
+                "SELECT operator_panel.settle_request(%s, %s, %s, %s, %s)",
+                (self._panel, request.id, status, reason, rows),
+            )
 
     def _insert(self, table: str, columns: str, row: tuple[Any, ...]) -> None:
         marks = ", ".join(["%s"] * len(row))

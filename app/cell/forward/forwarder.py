@@ -20,6 +20,7 @@ from typing import Any, Final
 from app.cell.forward.centre import Batch, Centre, CentreError
 from app.cell.forward.config import ForwardConfig, read_forward
 from app.cell.forward.cursors import Position, resume
+from app.cell.forward.details import Answer
 from app.cell.forward.spool import Cursor, Spool, folder_bytes, process_use, uptime_s
 from app.cell.forward.status import ForwardStatus
 from app.cell.forward.streams import STREAMS, Backlog, Mark, Stream, StreamRow
@@ -39,6 +40,7 @@ REMOVE_EVERY_S: Final = 600.0
 SLOW_S: Final = 5.0  # a longer commit is reported
 LONGEST_REST_S: Final = 1.0
 ALIVE_S: Final = 10.0  # the longest time between two reports of the status
+REQUESTS_EVERY_S: Final = 5.0  # between two looks whether details are asked for
 MOST_SLICES: Final = 20  # batches of one stream before the others have their turn
 REMOVED: Final = "removed in the cell before it was sent"
 REFUSED: Final = "refused by the database: "
@@ -86,8 +88,10 @@ class Forwarder:
         self._clock_ahead_s: float | None = None
         self._failures = 0
         self._is_behind = False
+        self._answer: Answer | None = None
         # In monotonic seconds, when it is due.
         self._retry_at = self._measure_at = self._health_at = self._remove_at = 0.0
+        self._requests_at = 0.0
 
     @property
     def _streams(self) -> list[Stream]:
@@ -166,6 +170,9 @@ class Forwarder:
         for stream in self._streams:
             with self._tolerating():
                 self._send_stream(centre, spool, stream)
+        if not self._is_behind and centre.has_requests:
+            with self._tolerating():
+                self._send_details(centre)
         self._failures = 0
         if not self.status.connected:
             self.status.connected, self.status.since = True, self._now()
@@ -196,6 +203,7 @@ class Forwarder:
             self._centre.close()
             self._centre = None
         self._sending.clear()
+        self._answer, self._requests_at = None, 0.0
 
     def _send_stream(self, centre: Centre, spool: Spool, stream: Stream) -> None:
         """Sends some batches of a stream."""
@@ -274,6 +282,48 @@ class Forwarder:
         self.status.sent += len(rows)
         self.status.sent_at, self.status.took_s = self._now(), time.monotonic() - began
         return True
+
+    def _send_details(self, centre: Centre) -> None:
+        """Sends some batches of the details that the cell is asked for."""
+        answer = self._answer or self._next_answer(centre)
+        self._answer = None  # one that can't be read begins again
+        for _ in range(MOST_SLICES if answer is not None else 0):
+            assert answer is not None
+            batch = None if answer.refusal else answer.batch(self._config.batch)
+            if batch is None:
+                self._settle(centre, answer)
+                return
+            began = time.monotonic()
+            centre.send_details(*batch)
+            answer.done(batch[1])
+            if self._rests:
+                time.sleep(min(time.monotonic() - began, LONGEST_REST_S))
+        self._answer = answer
+        self._is_behind = answer is not None
+
+    def _settle(self, centre: Centre, answer: Answer) -> None:
+        status = "refused" if answer.refusal else "done"
+        centre.settle(answer.request, status, answer.refusal or answer.note, answer.sent)
+        log.info(
+            "request %d of %s for details: %s, %d values sent",
+            answer.request.id,
+            answer.request.asked_by,
+            answer.refusal or status,
+            answer.sent,
+        )
+        self._requests_at, self._is_behind = 0.0, True
+
+    def _next_answer(self, centre: Centre) -> Answer | None:
+        """The oldest request whose time span is over, if it is time to look."""
+        if time.monotonic() < self._requests_at:
+            return None
+        self._requests_at = time.monotonic() + REQUESTS_EVERY_S
+        now = self._now()
+        request = next((request for request in centre.requests() if request.is_due(now)), None)
+        if request is None:
+            return None
+        sends = "trends" in self._config.streams
+        return Answer(self._folder, request, centre.known_pens() if sends else ())
 
     def _batch(self, spool: Spool, sending: _Sending, rows: list[StreamRow]) -> Batch:
         stream, cursor = sending.stream, sending.cursor

@@ -94,13 +94,16 @@ def upgrade(db: "Database", *, new: bool) -> tuple[int, int, int]:
 def prune(db: "Database", days: int, streams: tuple[str, ...]) -> dict[str, int]:
     """Removes rows that are older than so many days; returns how many of each stream. Of the log, all
     entries of a panel before a signature whose entries before it are all as old: the rest begins with
-    this signed head, so that it can be verified. Makes partitions."""
+    this signed head, so that it can be verified. With the trends go their details. Makes partitions."""
     removed: dict[str, int] = {}
     with db.transaction():
         db.execute("SELECT pg_advisory_xact_lock(%s)", (LOCK,))
         for stream in streams:
             removed[stream] = _prune_log(db, days) if stream == "log" else _prune(db, stream, days)
             _drop_empty(db, TABLES[stream], days)
+        if "trends" in streams:
+            removed["details"] = _prune_details(db, days)
+            _drop_empty(db, "trend_detail", days)
         db.execute("SELECT operator_panel.keep_partitions()")
     return removed
 
@@ -150,6 +153,13 @@ def _prune(db: "Database", stream: str, days: int) -> int:
         {"stream": stream, "days": days},
     )
     return db.execute(f"DELETE FROM {table} WHERE at < {OLD}", {"days": days}).rowcount
+
+
+def _prune_details(db: "Database", days: int) -> int:
+    """Of the requests goes what was settled as long ago."""
+    old = {"days": days}
+    db.execute(f"DELETE FROM operator_panel.detail_request WHERE settled_at < {OLD}", old)
+    return db.execute(f"DELETE FROM operator_panel.trend_detail WHERE at < {OLD}", old).rowcount
 
 
 def _drop_empty(db: "Database", table: str, days: int) -> None:

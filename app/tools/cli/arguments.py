@@ -4,6 +4,7 @@ import os
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from datetime import datetime
 from math import inf
 from pathlib import Path
 from typing import Any, Final
@@ -98,6 +99,15 @@ def seconds(most: float = inf) -> Callable[[str], float]:
         raise ArgumentTypeError(f'"{text}" is not a time: {right}')
 
     return checked
+
+
+def point_in_time(text: str) -> datetime:
+    """A time as ISO 8601, of this machine's zone if it names none; of two times that the clock shows
+    twice, the first."""
+    try:
+        return datetime.fromisoformat(text).astimezone()
+    except (ValueError, OverflowError, OSError):
+        raise ArgumentTypeError(f'"{text}" is not a time, like 2027-01-20T10:00') from None
 
 
 def _digits(text: str) -> int:

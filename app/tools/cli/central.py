@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 from app.cell.forward.config import STREAMS, read_central
 from app.system.errors import KioskError, SettingsError
-from app.tools.cli.arguments import whole_number
+from app.tools.cli.arguments import point_in_time, whole_number
 from app.tools.cli.forward import add_settings_file, settings_file
 from app.tools.cli.parser import Parser
 
 if TYPE_CHECKING:
+    from app.tools.central.details import DetailRequest
     from app.tools.central.verification import PanelResult
 
 PROG: Final = "python -m app.cli central"
@@ -88,6 +89,37 @@ def _summary(result: "PanelResult") -> str:
     return f"{result.panel.name}{retired}: {result.entries} entries of the log, {signed}"
 
 
+def _ask(options: Namespace) -> int:
+    from app.tools.central.details import ask, requests
+    from app.tools.central.schema import database
+
+    with database(read_central(settings_file(options))) as db:
+        if options.list:
+            for request in requests(db, options.panel):
+                print(_line(request))
+            return 0
+        if not options.panel or options.since is None:
+            raise SettingsError("ask needs --panel and --from, or --list")
+        number = ask(db, options.panel, options.pen or (), options.since, options.until)
+    print(f"request {number}: {options.panel} sends the details when it is connected (ask --list)")
+    return 0
+
+
+def _line(request: "DetailRequest") -> str:
+    pens = ", ".join(f'"{pen}"' for pen in request.pens) or "all pens"
+    result = f", {request.rows} values" if request.status == "done" else ""
+    reason = f": {request.reason}" if request.reason else ""
+    return (
+        f"{request.number} {request.panel}: {pens} from {_seconds(request.since)} until"
+        f" {_seconds(request.until)}, asked by {request.asked_by} at {_seconds(request.asked_at)}:"
+        f" {request.status}{result}{reason}"
+    )
+
+
+def _seconds(at: datetime) -> str:
+    return at.astimezone().isoformat(timespec="seconds")
+
+
 def _noted_key(text: str) -> tuple[str, str]:
     from app.records.log_key import parse_public_key
 
@@ -133,6 +165,23 @@ def make_parser(prog: str) -> Parser:
     prune.add_argument(
         "--stream", action="append", choices=STREAMS, help="only of this one; default: of all"
     )
-    for command in (init, upgrade, verify, prune):
+    ask = commands.add_parser(
+        "ask", help="ask a panel for the seconds of its trends, which stay in the cell otherwise"
+    )
+    ask.set_defaults(run=_ask)
+    ask.add_argument("--panel", default="", metavar="NAME", help="of which panel")
+    ask.add_argument(
+        "--from", dest="since", type=point_in_time, metavar="TIME", help="such as 2027-01-20T10:00"
+    )
+    ask.add_argument("--until", type=point_in_time, metavar="TIME", help="default: now")
+    ask.add_argument(
+        "--pen",
+        action="append",
+        metavar="TOPIC",
+        help='a topic, or a topic and a field ("/speed data"); may be given several times;'
+        " default: all pens",
+    )
+    ask.add_argument("--list", action="store_true", help="show the newest requests and their results")
+    for command in (init, upgrade, verify, prune, ask):
         add_settings_file(command)
     return parser

@@ -19,7 +19,7 @@ from app.records.database import Filter, as_log_error, entry_count, open_read_on
 from app.records.verify import Signed, verify
 from app.system.errors import KioskError, LogError
 from app.system.texts.catalogue import ENGLISH, files
-from app.tools.cli.arguments import add_data_folder, data_folder
+from app.tools.cli.arguments import add_data_folder, data_folder, point_in_time
 from app.tools.cli.output import terminal_progress
 from app.tools.cli.parser import Parser
 
@@ -182,11 +182,8 @@ def _export(options: Namespace) -> int:
 
 
 def _time(text: str) -> int:
-    """Milliseconds since 1970; of two times that the clock shows twice, the first."""
-    try:
-        return int(datetime.fromisoformat(text).timestamp() * 1000)
-    except (ValueError, OverflowError, OSError):
-        raise ArgumentTypeError(f'"{text}" is not a time, like 2027-01-20T10:00') from None
+    """Milliseconds since 1970."""
+    return int(point_in_time(text).timestamp() * 1000)
 
 
 def make_parser(prog: str) -> Parser:

@@ -50,7 +50,8 @@ def test_init_makes_the_schema_once(postgres: Cluster, run: Run) -> None:
     assert (status, error) == (1, "there is no schema operator_panel in this database: use init\n")
     status, output, _ = run("init")
     assert status == 0
-    assert output == f"the schema has version {SCHEMA_VERSION}; {14 * len(TABLES)} partitions made\n"
+    made = 14 * len((*TABLES, "details"))
+    assert output == f"the schema has version {SCHEMA_VERSION}; {made} partitions made\n"
     status, _, error = run("init")
     assert (status, "is there already, in version" in error) == (1, True)
     status, output, _ = run("upgrade")
@@ -200,7 +201,7 @@ def test_prune_keeps_a_chain_that_begins_with_a_signed_head(
     assert status == 1
     assert "the entries before 42 are missing, and not by prune" in output
     status, output, _ = run("prune", "--days", "31", "--stream", "trends")
-    assert (status, output) == (0, "trends: 0 rows removed\n")
+    assert (status, output) == (0, "trends: 0 rows removed\ndetails: 0 rows removed\n")
     assert query(centre, "SELECT to_regclass('operator_panel.log_2000_01')") == [(None,)]
 
 

@@ -61,6 +61,10 @@ INSERT INTO pen SELECT p.id, 0, n, '', '/value' || n, 'std_msgs/msg/Float64', 'd
 INSERT INTO trend SELECT p.id, 0, k, 60, m * 4 + k,
     date_trunc('minute', now()) - interval '2 days' + m * interval '1 minute', m - 1, m + 1, m, m
   FROM panel p, generate_series(1, 4) k, generate_series(1, 2 * 1440) m;
+INSERT INTO trend_detail SELECT p.id, 0, k, 1, now() - interval '1 day' + s * interval '1 second',
+    s - 1, s + 1, s FROM panel p, generate_series(1, 4) k, generate_series(1, 60) s;
+INSERT INTO detail_request (panel, pens, since, until, asked_by, status, rows)
+  SELECT p.id, '{{/value1}}', now() - interval '1 day', now(), 'ann', 'done', 60 FROM panel p;
 INSERT INTO recipe SELECT p.id, 0, n, now() - n * interval '3 h', 'user 2', '', 'save', 'boxes/small',
     'succeeded', 'Saved', '{{}}' FROM panel p, generate_series(1, 20) n;
 INSERT INTO health SELECT p.id, 0, n, now() - interval '2 days' + n * interval '1 min', '0.1.0',
