@@ -260,6 +260,11 @@ class StateRules(StatesKey, TopicField):
         red = (state.value for state in self.states if state.colour == "red")
         return tuple(red) if self.stops is None else self.stops
 
+    @property
+    def playing_values(self) -> tuple[Any, ...]:
+        """The values of the states that are shown by the shape "play"."""
+        return tuple(state.value for state in self.states if state.shape == "play")
+
     def with_constants(self, interfaces: Interfaces) -> Self:
         resolved = super().with_constants(interfaces)
         if self.stops is None:
@@ -346,7 +351,7 @@ class OeeRules(NeedsKey):
         """The values with which the machine produces."""
         if self.running is not None:
             return self.running
-        return tuple(state.value for state in rules.states if state.shape == "play")
+        return rules.playing_values
 
     def with_constants(self, rules: StateRules | None, interfaces: Interfaces) -> Self:
         """The same with values in place of constants' names."""

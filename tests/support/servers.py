@@ -14,10 +14,12 @@ def demo_server(folder: Path, panel: str, **more: Any) -> Server:
     return ready(Server(ROOT, KIOSK_PANEL=path, KIOSK_MODE="demo", **more))
 
 
-def live_server(bridge: Bridge, folder: Path, panel: str, **more: Any) -> Server:
-    """A server with a panel, by its text, behind a bridge. `more` is for `Server`."""
+def live_server(bridge: Bridge | str, folder: Path, panel: str, **more: Any) -> Server:
+    """A server with a panel, by its text, behind a bridge or what is at an endpoint. `more` is for
+    `Server`."""
     path = str(panel_file(folder, panel))
-    return ready(live(bridge.endpoint, folder, KIOSK_PANEL=path, **more))
+    endpoint = bridge if isinstance(bridge, str) else bridge.endpoint
+    return ready(live(endpoint, folder, KIOSK_PANEL=path, **more))
 
 
 def ready(server: Server) -> Server:

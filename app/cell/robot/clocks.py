@@ -204,6 +204,12 @@ class RobotClock:
         if shown != self._shown:
             self._shown, self.version = shown, self.version + 1
 
+    def peer_ahead(self, zid: str) -> float | None:
+        """By how many seconds the clock of a peer is ahead of the panel's; None while that is not
+        known."""
+        offsets = self._peers.get(zid)
+        return None if offsets is None else offsets.greatest
+
     def forget(self) -> None:
         """The link was lost: nothing is known of its clock, and no simulated time arrives."""
         self._peers.clear()

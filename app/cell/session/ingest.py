@@ -72,7 +72,9 @@ class Ingest:
         robot: RobotState,
         handlers: SampleHandlers,
         listeners: Collection[SampleListener] = (),
+        observers: Collection[SampleListener] = (),
     ) -> None:
+        """`observers` need only the samples that differ from the one before."""
         self._robot = robot
         self._handlers = handlers
         self._log = RobotLog(log, robot.name)
@@ -99,13 +101,17 @@ class Ingest:
             for key in listener.keys:
                 self._by_key.setdefault(key, []).append(listener)
         self.recorded = frozenset(self._by_key)
+        for observer in observers:
+            for key in observer.keys:
+                self._by_key.setdefault(key, []).append(observer)
+        self.changing = frozenset(self._by_key) - self.recorded
         self._clock_version = robot.clock.version
         judged = {topic for alarm in panel.alarms for topic in alarm.evaluated_topics}
         judged |= {topic for recipes in panel.recipes for topic in recipes.readback_topics}
         views = [panel.map_views[widget.map] for widget in panel.map_inputs]
         judged |= {topic for view in views for topic in view.deciding_topics}
         self._judged = frozenset(key for topic in judged for key in robot.possible_keys(topic))
-        self._judged |= self._needed | self.immediate | self.lossless | self.recorded
+        self._judged |= self._needed | self.immediate | self.lossless | self._by_key.keys()
 
     def only_shown(self, keys: Collection[str]) -> frozenset[str]:
         """Those of these keys by whose topics nothing is judged or recorded, and that no command

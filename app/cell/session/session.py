@@ -219,6 +219,7 @@ class RobotSession:
             immediate=self.ingest.immediate,
             lossless=self.ingest.lossless,
             recorded=self.ingest.recorded,
+            changing=self.ingest.changing,
         )
 
     async def stop(self) -> None:
@@ -398,14 +399,8 @@ def wire_session(
         panel,
         robot,
         commands.sample_handlers,
-        [
-            robot.table_entries,
-            log_lines,
-            published_alarms,
-            *recorders,
-            *map_listeners,
-            *_observers(server, context),
-        ],
+        [robot.table_entries, log_lines, published_alarms, *recorders, *map_listeners],
+        _observers(server, context),
     )
     own_line = partial(_show_own_line, robot, refresher)
     session = RobotSession(

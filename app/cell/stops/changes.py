@@ -19,6 +19,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 from app.cell.alarms.records import text_of
 from app.cell.permission.interlocks import link_verdict
+from app.cell.robot.clocks import is_other_time
 from app.cell.robot.state import RobotState, Sample
 from app.cell.view.conditions import condition_row
 from app.cell.view.displays import field_state, lamp_of
@@ -38,7 +39,8 @@ ChangeSort = Literal["state", "interlock", "condition", "link", "publisher", "no
 
 class Change(NamedTuple):
     """A change at `at` (seconds since the epoch, when the panel received it). `sent` is the time that
-    the robot's peer put on it, on the panel's clock, None where that is not known. `id` is that of the
+    a peer of the robot put on it, on the panel's clock, None where that is not known; `clock` is the
+    zid of the peer. `id` is that of the
     interlock or condition, or the name of a topic or node. `breaks`: it is not met, is lost, or is a
     state that is a stop; `heals`: that is over. Texts are JSON, "" for none. `seq` is 0 before it is
     written."""
@@ -53,6 +55,7 @@ class Change(NamedTuple):
     before: str = ""
     after: str = ""
     reason: str = ""
+    clock: str = ""
     seq: int = 0
 
 
@@ -61,17 +64,19 @@ class Change(NamedTuple):
 PER_VALUE: Final = Quota(20, per_s=0.5)  # changes of one value that are recorded
 MOST_AT_ONCE: Final = 50  # names of a sort in one step
 CLOCK_SET_S: Final = 1.0  # by so much the panel's clock is set
+STAMPED_LATE_S: Final = 0.001  # a stamp is no later than the arrival of its message
 
 
 @dataclass(slots=True)
 class _Watched:
-    """A condition with what was known of it last; `until` (monotonic seconds) is when time alone
-    changes that. `is_known`: it has been met or not since the start."""
+    """A condition with what was known of it last, by a value of its field; `until` (monotonic seconds)
+    is when time alone changes that. `is_known`: it has been met or not since the start."""
 
     condition: NamedCondition
     sort: ChangeSort
     met: str = ""
     value: TextLike = ""
+    raw: Any = None
     until: float = -math.inf
     is_known: bool = False
 
@@ -85,7 +90,7 @@ class ChangeObserver:
     robot: RobotState
     journal: "ChangeJournal"
     _watched: dict[str, list[_Watched]] = field(default_factory=dict)  # by the topic's key
-    _sent: dict[tuple[str, float], float] = field(default_factory=dict)
+    _samples: dict[tuple[str, float], Sample] = field(default_factory=dict)
     _unsent: list[tuple[str, Change]] = field(default_factory=list)
     _state: tuple[Any, TextLike] | None = None
     _is_linked: bool | None = None
@@ -111,7 +116,7 @@ class ChangeObserver:
     def record_sample(self, key: str, sample: Sample) -> None:
         """A sample was received, in this turn."""
         if sample.sent is not None:
-            self._sent[key, sample.wall] = sample.sent
+            self._samples[key, sample.wall] = sample
 
     def step(self, topics: Collection[str], everything: bool) -> None:
         """A step of a turn: messages arrived on topics with these keys or, with `everything`, anything
@@ -135,17 +140,22 @@ class ChangeObserver:
     def finish(self) -> None:
         """The turn has ended: what was observed in it is recorded, with the stamps of its samples."""
         for key, change in self._unsent:
-            sent = self._sent.get((key, change.at))
-            self.journal.add(change._replace(sent=self._on_own_clock(sent)))
+            sample = self._samples.get((key, change.at))
+            sent = None if sample is None else self._on_own_clock(sample)
+            if sample is not None and sent is not None:
+                change = change._replace(sent=sent, clock=sample.source or "")
+            self.journal.add(change)
         self._unsent.clear()
-        self._sent.clear()
+        self._samples.clear()
 
-    def _on_own_clock(self, sent: float | None) -> float | None:
-        """A stamp of the robot's peer on the panel's clock; None where they can't be compared."""
-        skew = self.robot.clock.skew
-        if sent is None or skew is None or skew.witness != "peer" or skew.state == "other_time":
+    def _on_own_clock(self, sample: Sample) -> float | None:
+        """The stamp of a sample on the panel's clock; None where they can't be compared, as where the
+        peer's clock was set: nothing arrives before it is sent."""
+        ahead = self.robot.clock.peer_ahead(sample.source or "")
+        if ahead is None or sample.sent is None or is_other_time(ahead):
             return None
-        return sent - skew.seconds
+        sent = sample.sent - ahead
+        return sent if sent <= sample.wall + STAMPED_LATE_S else None
 
     def _observe_clock(self, now: float, wall: float) -> None:
         ahead = wall - now
@@ -206,6 +216,13 @@ class ChangeObserver:
 
     def _observe_condition(self, key: str, watched: _Watched, now: float, wall: float) -> None:
         condition = watched.condition
+        reading = self.robot.reading(condition.topic)
+        fields = reading.fields if reading.status == "message" and not reading.keyed else None
+        raw = None if fields is None else fields.get(condition.field)
+        is_known = raw is not None and watched.met in ("met", "unmet")
+        if is_known and raw == watched.raw and now < watched.until:
+            return  # a message like the one before
+        watched.raw = raw
         row = condition_row(condition, self.robot, now)
         watched.until = row.until
         was, value = watched.met, watched.value
@@ -215,7 +232,6 @@ class ChangeObserver:
             return
         if was == row.met:
             return
-        reading = self.robot.reading(condition.topic)
         is_of_value = "unknown" not in (was, row.met)
         change = Change(
             reading.wall if is_of_value else wall, None, self._id, watched.sort, condition.id,
@@ -254,7 +270,8 @@ SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS changes (
     seq INTEGER PRIMARY KEY AUTOINCREMENT, at REAL NOT NULL, sent REAL, robot TEXT NOT NULL,
     sort TEXT NOT NULL, id TEXT NOT NULL, breaks INTEGER NOT NULL, heals INTEGER NOT NULL,
-    before TEXT NOT NULL, after TEXT NOT NULL, reason TEXT NOT NULL
+    before TEXT NOT NULL, after TEXT NOT NULL, reason TEXT NOT NULL,
+    clock TEXT NOT NULL
 );
 CREATE INDEX IF NOT EXISTS changes_at ON changes (at);
 """

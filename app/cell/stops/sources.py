@@ -81,6 +81,15 @@ class PanelNames:
         return frozenset(source for source in self.every_source if source[0] == topic)
 
     @cached_property
+    def running(self) -> frozenset[str]:
+        """The states in which the machine produces."""
+        state, oee = self.panel.state, self.panel.oee
+        if state is None:
+            return frozenset()
+        values = oee.running_values(state) if oee else state.playing_values
+        return frozenset(map(str, values))
+
+    @cached_property
     def state_sources(self) -> frozenset[Source]:
         state = self.panel.state
         return frozenset({(state.topic, state.field)}) if state else frozenset()
@@ -123,8 +132,9 @@ def change_events(names: PanelNames, changes: Iterable[Change]) -> Iterator[Even
             text_in_json(row.before),
             text_in_json(row.after),
             row.sent,
+            row.clock,
             breaks=row.breaks and row.sort != "state",
-            heals=row.heals,
+            heals=row.heals or (row.sort == "state" and row.id in names.running),
             sources=_change_sources(names, row, together),
         )
 
@@ -224,7 +234,7 @@ def change_stops(
         known = names(row.robot)
         text = text_in_json(row.after) if row.sort == "state" else say("story_link_lost", name="")
         sources = _change_sources(known, row, ())
-        yield Stop(row.at, row.robot, row.sort, row.seq, row.id, text, row.sent, sources)
+        yield Stop(row.at, row.robot, row.sort, row.seq, row.id, text, row.sent, row.clock, sources)
 
 
 def alarm_stops(rows: Iterable[HistoryRow]) -> Iterator[Stop]:

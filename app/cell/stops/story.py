@@ -6,10 +6,9 @@ The rule for the first cause is documented in docs/how-to/stops.md; where it doe
 says so.
 """
 
-from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final, Literal, NamedTuple
 
 from app.cell.view.times import span_text
@@ -27,6 +26,8 @@ BOUNCE_S: Final = 1.0  # changes to and fro within this time are one
 ROUTINE: Final = 3  # a condition that was not met so often before the stop is part of the cycle
 SAME_STAMP_S: Final = 0.001  # two stamps of one clock that differ by less are not ordered
 SAME_ARRIVAL_S: Final = 0.05  # nor are two arrivals
+APART_S: Final = 1.0  # nor what two clocks have stamped: how far they are apart is only estimated
+LATE_ALARM_S: Final = 0.25  # by so much an alarm may be raised later than its message arrived
 
 Sort = Literal[
     "state", "interlock", "condition", "alarm", "link", "node", "publisher", "clock",
@@ -42,12 +43,13 @@ CYCLIC: Final[Collection[Sort]] = frozenset({"condition", "interlock"})
 
 class Event(NamedTuple):
     """Something that changed. `at` is when the panel received it, in seconds since the epoch; `sent`
-    the time that the robot's peer put on it, on the panel's clock, None where that is not known.
-    `began_s` is how long before `at` it began: the delay of an alarm.
+    the time that a peer of the robot put on it, on the panel's clock, None where that is not known;
+    `clock` says which peer. `began_s` is how long before `at` it began: the delay of an alarm.
 
     `id` is that of the interlock, condition, alarm or control, or the name of a topic or node.
     `breaks`: it may stop the machine; `heals`: that is over. `sources` are the values that it is about.
-    `follows` is the id of the alarm of its group that was first, "" for none. `by` is who acted."""
+    `follows` is the id of the alarm of its group that was first, "" for none. `by` is who acted. A
+    state heals if it ends a stop, or production goes on."""
 
     at: float
     sort: Sort
@@ -57,6 +59,7 @@ class Event(NamedTuple):
     before: TextLike = ""
     after: TextLike = ""
     sent: float | None = None
+    clock: str = ""
     began_s: float = 0.0
     breaks: bool = False
     heals: bool = False
@@ -83,6 +86,7 @@ class Stop(NamedTuple):
     id: str
     text: TextLike
     sent: float | None = None
+    clock: str = ""
     sources: frozenset[Source] = frozenset()
     end: float | None = None
 
@@ -96,7 +100,7 @@ class Stop(NamedTuple):
         return self.at if self.sent is None else self.sent
 
 
-Why = Literal["none_named", "same_moment", "restarted", "too_many"]
+Why = Literal["none_named", "same_moment", "cycle", "restarted", "cut", "too_many"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +140,8 @@ class Story:
             tied = tuple(event.text for event in self.tied)
             return say(UNTOLD[self.why or "none_named"], time=time, stop=stop, causes=tied)
         later = self.following
-        if later is None:
+        is_told_apart = self.by_stamps or (later and later.begun - self.first.begun >= SAME_ARRIVAL_S)
+        if later is None or not is_told_apart:
             return say("story_by", time=time, stop=stop, cause=self.first.text)
         span = self.span_text(later.begun - self.first.begun)
         return say(
@@ -174,7 +179,9 @@ class Story:
 UNTOLD: Final[dict[Why, str]] = {
     "none_named": "story_untold",
     "same_moment": "story_untold_together",
+    "cycle": "story_untold_cycle",
     "restarted": "story_untold_restarted",
+    "cut": "story_untold_cut",
     "too_many": "story_untold_too_many",
 }
 
@@ -188,19 +195,29 @@ def story_of(
 ) -> Story:
     """The story of a stop, from what changed around it. `effects` are ids of what only follows from a
     stop, as the panel file says. If the events are not complete, what was first can't be told."""
+    known = list(_as_their_values(events))
+    by_stamps = (stop.sent is not None or stop.sort != "state") and all(
+        event.sent is not None for event in _possible(stop, known, _by_value(known), effects)
+    )
+    if not by_stamps:
+        stop = stop._replace(sent=None)
+        known = [event._replace(sent=None) for event in known]
     begun = stop.begun
-    within = [e for e in events if begun - BEFORE_S <= e.begun <= begun + AFTER_S]
+    within = [e for e in known if begun - BEFORE_S <= e.begun <= begun + AFTER_S]
     ordered = sorted(within, key=lambda event: event.begun)
-    chain = causes(stop, ordered, effects)
+    values = _by_value(ordered)
+    chain = causes(stop, ordered, values, effects)
     tied = _first_together(chain)
     first = _named_best(tied) if tied else None
     why: Why | None = None
     if not are_complete:
         first, tied, why = None, (), "too_many"
-    elif any(e.sort == "server" and begun - GAP_S <= e.begun <= begun for e in ordered):
-        first, tied, why = None, (), "restarted"
+    elif cut := _cut_before(stop, ordered):
+        first, tied, why = None, (), cut
     elif not tied:
         why = "none_named"
+    elif unusual := tuple(event for event in tied if _is_routine(event, values)):
+        first, tied, why = None, unusual, "cycle"
     elif first is None:
         why = "same_moment"
     zero = first.begun if first else begun
@@ -214,28 +231,81 @@ def story_of(
         first,
         why,
         () if first else tied,
-        bool(chain) and all(event.sent is not None for event in chain),
+        by_stamps and bool(chain),
         are_complete and len(ordered) <= MOST_EVENTS,
     )
 
 
-def causes(stop: Stop, ordered: Sequence[Event], effects: Collection[str]) -> tuple[Event, ...]:
-    """The events that may have caused a stop, from the first on: what the panel names and what broke,
-    still stands at the stop, and is not separated from it by a longer time."""
-    possible = [
+def _as_their_values(events: Iterable[Event]) -> Iterator[Event]:
+    """The events, of which alarms have the times of the interlock or condition that changed by the same
+    message: alarms have no stamps, and are raised some time after its arrival."""
+    every = list(events)
+    changes = [event for event in every if event.sort in CYCLIC and event.breaks]
+    for event in every:
+        same = (
+            change
+            for change in changes
+            if event.sort == "alarm"
+            and event.breaks
+            and event.sources & change.sources
+            and -SAME_ARRIVAL_S <= event.at - event.began_s - change.at <= LATE_ALARM_S
+        )
+        change = next(same, None)
+        if change is None:
+            yield event
+        else:
+            yield event._replace(at=change.at, sent=change.sent, clock=change.clock, began_s=0.0)
+
+
+def _cut_before(stop: Stop, ordered: Sequence[Event]) -> Why | None:
+    """Why nothing is known of the time right before a stop: the server was started, or the link was
+    cut, and what changed in that time arrived at its end."""
+    near = [event for event in ordered if stop.begun - GAP_S <= event.begun <= stop.begun]
+    if any(event.sort == "server" for event in near):
+        return "restarted"
+    is_cut = stop.sort != "link" and any(event.sort == "link" and event.heals for event in near)
+    return "cut" if is_cut else None
+
+
+Values = Mapping[tuple[Sort, str], Sequence[Event]]
+
+
+def _by_value(ordered: Iterable[Event]) -> Values:
+    """The events by their sort and id; states together, as one ends another."""
+    values: dict[tuple[Sort, str], list[Event]] = {}
+    for event in ordered:
+        values.setdefault((event.sort, "" if event.sort == "state" else event.id), []).append(event)
+    return values
+
+
+def _possible(
+    stop: Stop, events: Iterable[Event], values: Values, effects: Collection[str]
+) -> list[Event]:
+    """The events that may have caused a stop: what breaks, and still stands at the stop."""
+    return [
         event
-        for event in ordered
+        for event in events
         if event.breaks
         and event.id not in effects
         and not event.follows
         and not _is_stop_itself(event, stop)
-        and event.begun <= stop.begun + _resolution(event.sent is not None and stop.sent is not None)
-        and not _is_over(event, ordered, stop)
+        and event.begun <= stop.begun + _resolution(event, stop)
+        and not _is_over(event, values, stop)
     ]
-    routine = _routine(ordered, stop)
+
+
+def causes(
+    stop: Stop, ordered: Sequence[Event], values: Values, effects: Collection[str]
+) -> tuple[Event, ...]:
+    """The events that may have caused a stop, from the first on: what the panel names and what broke,
+    still stands at the stop, and is not separated from it by a longer time."""
+    possible = _possible(stop, ordered, values, effects)
     chain: list[Event] = []
     upper = stop.begun
-    for event in reversed([event for event in possible if (event.sort, event.id) not in routine]):
+    for event in reversed(possible):
+        later = next((other.begun for other in reversed(chain) if other.id != event.id), stop.begun)
+        if _is_routine(event, values) and _is_usual(event, values, later):
+            continue
         if upper - event.begun > GAP_S:
             break
         chain.append(event)
@@ -252,26 +322,44 @@ def _is_stop_itself(event: Event, stop: Stop) -> bool:
     return event.sort in ("state", "goal")
 
 
-def _is_over(event: Event, ordered: Sequence[Event], stop: Stop) -> bool:
-    """Whether it was well again some time before the stop."""
-    return any(
-        other.heals and (other.sort, other.id) == (event.sort, event.id)
-        for other in ordered
-        if event.begun < other.begun < stop.begun - RETURNED_S
-    )
+def _is_over(event: Event, values: Values, stop: Stop) -> bool:
+    """Whether it was well again some time before the stop; or was a press, after which the machine went
+    on."""
+    is_press = event.sort == "press"
+    of_value = values.get(("state", "") if is_press else (event.sort, event.id), ())
+    until = stop.begun if is_press else stop.begun - RETURNED_S
+    return any(other.heals and event.begun < other.begun < until for other in of_value)
 
 
-def _routine(ordered: Sequence[Event], stop: Stop) -> frozenset[tuple[Sort, str]]:
-    """What was not met again and again before the stop."""
-    times: defaultdict[tuple[Sort, str], list[float]] = defaultdict(list)
-    for event in ordered:
-        if event.breaks and event.sort in CYCLIC and event.begun <= stop.begun:
-            times[event.sort, event.id].append(event.begun)
+# What comes in each cycle.
 
-    def often(begun: Sequence[float]) -> int:
-        return 1 + sum(later - earlier > BOUNCE_S for earlier, later in pairwise(begun))
 
-    return frozenset(name for name, begun in times.items() if often(begun) >= ROUTINE)
+def _phases(event: Event, values: Values) -> list[tuple[float, float]]:
+    """From when to when its condition was not met, up to this event; infinity for one that has not
+    ended. What is shorter apart than a contact bounces is one."""
+    phases: list[tuple[float, float]] = []
+    for other in values[event.sort, event.id]:
+        if other.breaks and other.begun <= event.begun:
+            if phases and other.begun - phases[-1][0] <= BOUNCE_S:
+                phases[-1] = phases[-1][0], math.inf
+            else:
+                phases.append((other.begun, math.inf))
+        elif other.heals and phases and phases[-1][1] == math.inf:
+            phases[-1] = phases[-1][0], other.begun
+    return phases
+
+
+def _is_routine(event: Event, values: Values) -> bool:
+    """Whether a condition was not met again and again before the stop."""
+    return event.sort in CYCLIC and len(_phases(event, values)) >= ROUTINE
+
+
+def _is_usual(event: Event, values: Values, until: float) -> bool:
+    """Whether a condition that comes in each cycle was not met for as long as usual, until another
+    cause or the stop. If it was for longer, it may be the cause."""
+    *earlier, (begun, end) = _phases(event, values)
+    longest = max((end - begun for begun, end in earlier if end < math.inf), default=0.0)
+    return min(end, until) - begun <= longest
 
 
 def _first_together(chain: Sequence[Event]) -> tuple[Event, ...]:
@@ -282,8 +370,7 @@ def _first_together(chain: Sequence[Event]) -> tuple[Event, ...]:
     return tuple(
         event
         for event in chain
-        if event.begun - first.begun < _resolution(event.sent is not None and first.sent is not None)
-        or _is_same(event, first)
+        if event.begun - first.begun < _resolution(first, event) or _is_same(event, first)
     )
 
 
@@ -292,8 +379,15 @@ def _is_same(event: Event, first: Event) -> bool:
     return bool(event.sources & first.sources) and event.sort != first.sort
 
 
-def _resolution(is_stamped: bool) -> float:
-    return SAME_STAMP_S if is_stamped else SAME_ARRIVAL_S
+def _resolution(first: Event, later: Event | Stop) -> float:
+    """By how much the second must be later to be told from the first."""
+    if first.clock != later.clock and first.clock and later.clock:
+        return APART_S
+    if first.sent is not None and later.sent is not None:
+        return SAME_STAMP_S
+    if first.sort != "alarm" and later.sort == "alarm":
+        return LATE_ALARM_S
+    return SAME_ARRIVAL_S
 
 
 def _named_best(tied: Sequence[Event]) -> Event | None:

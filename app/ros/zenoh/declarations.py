@@ -11,7 +11,7 @@ from app.ros.zenoh.inbox import NO_KEYS
 class Declarations:
     """Key → key expression of each topic that is subscribed to or published, and of each service that
     is queried. `latched` are the published ones that keep their last messages, with how many.
-    `immediate`, `lossless` and `recorded` are the keys of topics for `Inbox.expect`."""
+    `immediate`, `lossless`, `recorded` and `changing` are the keys of topics for `Inbox.set_topics`."""
 
     subscribe: Mapping[str, str] = field(default_factory=dict)
     publish: Mapping[str, str] = field(default_factory=dict)
@@ -20,6 +20,7 @@ class Declarations:
     immediate: Collection[str] = NO_KEYS
     lossless: Collection[str] = NO_KEYS
     recorded: Collection[str] = NO_KEYS
+    changing: Collection[str] = NO_KEYS
 
 
 NOTHING: Final = Declarations()

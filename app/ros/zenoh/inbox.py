@@ -49,9 +49,9 @@ class Token:
 @dataclass(slots=True)
 class Changes:
     """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
-    `recorded_samples` has every sample of the recorded topics. `caches` are (key, token) of the
-    publishers that keep their last message for late subscribers. `reopen`: the session has to be opened
-    again."""
+    `recorded_samples` has every sample of the recorded topics, and the changes of the changing ones.
+    `caches` are (key, token) of the publishers that keep their last message for late subscribers.
+    `reopen`: the session has to be opened again."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
@@ -118,7 +118,7 @@ class Inbox:
         self._lock = threading.Lock()
         self._seq = itertools.count(1)
         self._session = 0
-        self._immediate = self._lossless = self._recorded = self._idle = NO_KEYS
+        self._immediate = self._lossless = self._recorded = self._changing = self._idle = NO_KEYS
         self._timed_until = -math.inf  # until then samples have no `sent`
         self._forget()
 
@@ -127,6 +127,7 @@ class Inbox:
         self._samples: dict[str, _Arrived] = {}
         self._idle_samples: dict[str, _Arrived] = {}
         self._connections_changed = False
+        self._last_payloads: dict[str, bytes] = {}  # of the topics of which changes are kept
         self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
         self._caches: list[tuple[str, str]] = []
@@ -134,14 +135,20 @@ class Inbox:
         self._kept = _kept_samples()
 
     def set_topics(
-        self, immediate: Collection[str], lossless: Collection[str], recorded: Collection[str]
+        self,
+        immediate: Collection[str],
+        lossless: Collection[str],
+        recorded: Collection[str],
+        changing: Collection[str] = NO_KEYS,
     ) -> None:
         """Sets how topics are received, by their keys. A sample of an `immediate` topic wakes the event
         loop at once. Of `lossless` topics values that were replaced between two drains are kept. Every
-        sample of a `recorded` topic is kept."""
+        sample of a `recorded` topic is kept, and of a `changing` one each that differs from the one
+        before."""
         self._immediate = frozenset(immediate)
         self._lossless = frozenset(lossless)
         self._recorded = frozenset(recorded)
+        self._changing = frozenset(changing) - self._recorded
 
     def set_idle(self, idle: Collection[str]) -> None:
         """Sets the keys of the topics that no one looks at: their samples do not wake the event
@@ -238,6 +245,9 @@ class Inbox:
                 arrived.unseen = _unseen(replaced, payload)
         samples[key] = arrived
         if key in self._recorded:
+            self._keep(key, arrived)
+        elif key in self._changing and (content := bytes(payload)) != self._last_payloads.get(key):
+            self._last_payloads[key] = content
             self._keep(key, arrived)
         if not is_idle:
             self._wake(key in self._immediate)

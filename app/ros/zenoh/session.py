@@ -196,7 +196,9 @@ class ZenohSession:
 
     def expect(self, declared: Declarations) -> None:
         """What the next session declares."""
-        self._inbox.set_topics(declared.immediate, declared.lossless, declared.recorded)
+        self._inbox.set_topics(
+            declared.immediate, declared.lossless, declared.recorded, declared.changing
+        )
         self._declared = declared
 
     def forget(self) -> None:

@@ -620,6 +620,7 @@ ROWS: Final[Mapping[str, CellTopic]] = {
 
 ABORTED: Final = 6  # action_msgs/msg/GoalStatus
 LOG: Final = "/rosout"
+STATE: Final = "/cell/state"
 OUT: Final = "/pallet_out"
 
 
@@ -726,7 +727,7 @@ class PlayedPalletizing(PlayedStory):
         for level, text in self.cell.notes():
             if LOG in self.names.publishes:
                 yield LOG, log_fields(level, text, moment, "cell")
-        for topic in self.names.publishes:
+        for topic in sorted(self.names.publishes, key=lambda topic: topic == STATE):  # it is the last
             if (fields := self._topics.due(topic, moment)) is not None:
                 yield topic, fields
 

@@ -96,6 +96,61 @@ STOPS: dict[str, tuple[list[Event], str]] = {
         ],
         "",
     ),
+    "stamps of two clocks": (
+        [
+            event(-1.0, sent=-1.05, clock="a"),
+            event(-0.9, name="air", sent=-0.9, clock="b"),
+        ],
+        "same_moment",
+    ),
+    "a stamp is compared with an arrival by arrivals": (
+        [event(-0.6, sent=-1.2), event(-0.59, "alarm", "drive", sources=frozenset({AIR}))],
+        "same_moment",
+    ),
+    "an alarm that is raised some time after an interlock changed": (
+        [event(-1.0), event(-0.8, "alarm", "drive", sources=frozenset({AIR}))],
+        "same_moment",
+    ),
+    "an alarm has the stamp of its value": (
+        [
+            event(-1.0, sent=-1.05),
+            event(-0.9, "alarm", "door", sources=frozenset({GUARD})),
+            event(-0.98, name="air", sent=-1.03),
+        ],
+        "door",
+    ),
+    "a contact that was open longer than in each cycle, then the drives": (
+        [
+            *(e for at in (-40, -30, -20) for e in (event(at), well(at + 0.5))),
+            event(-5.0),
+            event(-3.0, name="drives"),
+        ],
+        "cycle",
+    ),
+    "a contact that is open as in each cycle, and the drives": (
+        [
+            *(e for at in (-40, -30, -20) for e in (event(at), well(at + 3.0))),
+            event(-5.0),
+            event(-3.0, name="drives"),
+        ],
+        "drives",
+    ),
+    "the link was cut right before": (
+        [
+            event(-7.0, "link", "", sources=frozenset({("link", "")})),
+            well(-5.0, "link", "", sources=frozenset({("link", "")})),
+            event(-0.5),
+        ],
+        "cut",
+    ),
+    "Stop was pressed, the machine started again, then the guard opened": (
+        [
+            event(-6.0, "press", "stop", sources=frozenset()),
+            well(-3.0, "state", "RUNNING", sources=frozenset({MODE})),
+            event(-0.5),
+        ],
+        "guard",
+    ),
     "an operator pressed Stop": ([event(-0.4, "press", "stop", sources=frozenset())], "stop"),
     "the panel server was started right before": (
         [event(-4.0, "server", "began", breaks=False), event(-1.0)],
@@ -109,7 +164,7 @@ STOPS: dict[str, tuple[list[Event], str]] = {
 @pytest.mark.parametrize("name", STOPS)
 def test_first_cause(name: str) -> None:
     events, expected = STOPS[name]
-    story = story_of(stop(), [PRESS, STATE, *events], effects={"no_fault"})
+    story = story_of(stop(sent=AT), [PRESS, STATE, *events], effects={"no_fault"})
     told = story.first.id if story.first is not None else story.why
     assert told == expected
     assert (story.first is None) == (story.why is not None)
@@ -143,7 +198,7 @@ def test_stops_that_are_no_states(of_stop: Stop, events: list[Event], expected: 
 
 
 def test_times_have_no_more_digits_than_the_clocks_agree_on() -> None:
-    stamped = story_of(stop(), [event(-1.0, sent=-1.2), event(-0.9, name="drives", sent=-1.188)])
+    stamped = story_of(stop(sent=AT), [event(-1.0, sent=-1.2), event(-0.9, name="drives", sent=-1.188)])
     assert stamped.by_stamps
     assert stamped.following is not None
     assert str(stamped.span_text(stamped.following.begun - stamped.zero)) == "12 ms"

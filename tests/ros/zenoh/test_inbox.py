@@ -29,9 +29,10 @@ def woken() -> list[bool]:
 
 @pytest.fixture
 def inbox(woken: list[bool]) -> Inbox:
-    """`permit` is lossless and immediate, `parts` lossless, `status` immediate, `taped` recorded."""
+    """`permit` is lossless and immediate, `parts` lossless, `status` immediate, `taped` recorded,
+    `guard` changing."""
     mine = Inbox(woken.append)
-    mine.set_topics(["status", "permit"], ["permit", "parts"], ["taped"])
+    mine.set_topics(["status", "permit"], ["permit", "parts"], ["taped"], ["guard", "taped"])
     return mine
 
 
@@ -178,6 +179,14 @@ def test_of_a_recorded_topic_every_sample_is_kept_in_order(inbox: Inbox) -> None
         ("taped", b"2"),
     ]
     assert list(inbox.drain().recorded_samples) == []
+
+
+def test_of_a_changing_topic_each_change_is_kept_over_drains_too(inbox: Inbox) -> None:
+    kept = []
+    for said in (b"1", b"1", b"0", b"0", b"1"):
+        inbox.put("guard", said, None)
+        kept += [sample.payload for _, sample in inbox.drain().recorded_samples]
+    assert kept == [b"1", b"0", b"1"]
 
 
 def test_recorded_samples_are_bounded_in_number_and_bytes(inbox: Inbox) -> None:
