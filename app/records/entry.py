@@ -32,6 +32,7 @@ Kind = Literal[
     "place",
     "access",
     "panel",
+    "clock",
     "removed",
     "resumed",
 ]

@@ -20,6 +20,7 @@ from app.cell.permission.robot_options import options_now
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.alarms import Alarms
 from app.cell.session.fleet import Fleet
+from app.cell.session.machine_watch import Machine
 
 if TYPE_CHECKING:
     from app.cell.forward.status import ForwardStatus
@@ -56,6 +57,8 @@ class _Of(Collector):
         if metrics.fleet is not None:
             yield from _of_fleet(metrics.fleet)
             yield from _of_alarms(metrics.fleet.alarms)
+            if metrics.fleet.machine is not None:
+                yield from _of_machine(metrics.fleet.machine.now)
             if metrics.fleet.alarms.mqtt.address:
                 yield from _of_mqtt(metrics.fleet.alarms.mqtt)
             if metrics.fleet.forward is not None:
@@ -84,6 +87,19 @@ def _of_alarms(alarms: Alarms) -> Iterator[Metric]:
         acknowledged.add_metric([str(priority)], count, seconds)
     yield raised
     yield acknowledged
+
+
+def _of_machine(machine: Machine) -> Iterator[Metric]:
+    about = "1 while the panel's own clock follows a time source; nothing if that is not known"
+    synchronised = GaugeMetricFamily("kiosk_time_synchronised", about)
+    if machine.time.synchronised is not None:
+        synchronised.add_metric([], int(machine.time.synchronised))
+    yield synchronised
+    about = "How far the panel's own clock is from its time source at most"
+    error = GaugeMetricFamily("kiosk_time_error_seconds", about)
+    if machine.time.within_s is not None:
+        error.add_metric([], machine.time.within_s)
+    yield error
 
 
 def _of_mqtt(mqtt: AlarmMqtt) -> Iterator[Metric]:

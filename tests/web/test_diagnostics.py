@@ -1,10 +1,12 @@
 """The page of diagnostics and its JSON, with a simulated robot: rows, live looks, acts, and how it is
 turned off."""
 
+import csv
 import io
 import json
 import zipfile
 from collections.abc import Iterator
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -284,3 +286,20 @@ def test_panel_without_the_page(tmp_path: Path) -> None:
             assert answer.status_code == 404
             assert "enabled = false" in answer.json()["error"]
         assert "/diagnostics" not in server.http.get("/", headers=HTML, follow_redirects=True).text
+
+
+def kinds_logged(server: Server) -> set[str]:
+    return {row["kind"] for row in csv.DictReader(io.StringIO(server.http.get("/log.csv").text))}
+
+
+def test_the_clock_of_the_pc_is_on_the_page_in_the_metrics_and_in_the_log(cell: Server) -> None:
+    """What it is on the machine of the test is not known; each place has the same."""
+    until(lambda: "clock" in kinds_logged(cell), "the time source is in the log")
+    (row,) = (row for row in diagnostics(cell)["machine"] if row["id"] == "time")
+    states = {"ok": "time_synchronised", "problem": "time_unsynchronised", "unknown": "time_unknown"}
+    assert 'data-row="time"' in page(cell)
+    sentence = render(say(states[row["state"]]))
+    assert sentence in unescape(cell.http.get("/log").text)
+    known = [line for line in cell.http.get("/metrics").text.splitlines() if "kiosk_time_synch" in line]
+    value = {"ok": ["1.0"], "problem": ["0.0"], "unknown": []}[row["state"]]
+    assert [line.split()[1] for line in known if not line.startswith("#")] == value

@@ -5,8 +5,9 @@ import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
 from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from app.cell.alarms.report import NAME as STATES
 from app.cell.people.access_log import read_rights
@@ -19,6 +20,7 @@ from app.panel.widgets.trend import trends_of
 from app.records import Limits, NullLog, OperatorLog
 from app.records.starts import KeptFiles, StartRecord, read_start_files
 from app.ros.zenoh.config import Config, config_from, config_to, tls_files
+from app.system.concurrency import end_tasks, keep_running
 from app.system.settings import Mode, Settings
 from app.system.used_certificates import ServedCertificate, UsedCertificates
 
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     from app.cell.session.site import SiteSummary
 
 log = logging.getLogger("kiosk")
+
+MACHINE_AFTER_S: Final = 2.0
 
 # (panel, which of its robots) → a simulated robot that runs while it is entered, by its endpoint.
 SimulatedRobot = Callable[[Panel, RobotEntry | None], AbstractContextManager[str]]
@@ -112,6 +116,7 @@ async def open_fleet(
         site = _site_summary(settings, panel, fleet)
         states = _state_recorder(fleet, fleet.states, panel)
         fleet.forward = _forward(settings, panel)
+        machine = keep_running(partial(_watch_machine, fleet, oplog), log, "the machine is not watched")
         try:
             if recordings is not None:
                 recordings.start()
@@ -137,6 +142,7 @@ async def open_fleet(
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
             yield fleet
         finally:
+            await end_tasks([machine])
             if fleet.forward is not None:
                 await fleet.forward.stop()
             if site is not None:
@@ -165,6 +171,16 @@ def _state_recorder(fleet: Fleet, path: Path, panel: Panel) -> StateRecorder | N
     from app.cell.session.stops import ask_reason
 
     return StateRecorder(path, fleet.sessions, partial(ask_reason, fleet))
+
+
+async def _watch_machine(fleet: Fleet, oplog: OperatorLog | NullLog) -> None:
+    """Begins, and is imported, after the first page."""
+    await asyncio.sleep(MACHINE_AFTER_S)
+    await asyncio.to_thread(import_module, "app.cell.session.machine_watch")
+    from app.cell.session.machine_watch import MachineWatch
+
+    fleet.machine = fleet.machine or MachineWatch(oplog, fleet.skews)
+    await fleet.machine.run()
 
 
 def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":

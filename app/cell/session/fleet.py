@@ -19,6 +19,7 @@ from app.cell.link.robot_access import ROBOT_ACCESS
 from app.cell.permission.conditions import fresh_since
 from app.cell.permission.interlocks import link_verdict, state_of
 from app.cell.permission.roles import ConfirmLocks
+from app.cell.robot.clocks import Skew
 from app.cell.robot.state import RobotState
 from app.cell.robot.topics import Slices
 from app.cell.session.alarms import Alarms
@@ -46,6 +47,7 @@ from app.system.texts import TextLike, joined, say
 if TYPE_CHECKING:
     from app.cell.history.recording import Recordings
     from app.cell.session.forward_process import ForwardProcess
+    from app.cell.session.machine_watch import MachineWatch
     from app.cell.session.maps import MapPictures
     from app.cell.session.place_file import SavedPlaceFile
     from app.cell.stops.changes import ChangeJournal
@@ -192,6 +194,7 @@ class Fleet:
         self.confirm_locks = ConfirmLocks()  # locked until the users are known
         self.states: Path | None = None  # the file of the machine's states
         self.forward: ForwardProcess | None = None  # to the plant's central database
+        self.machine: MachineWatch | None = None  # of a server that reaches robots
         server = ServerParts(
             panel,
             revision,
@@ -252,6 +255,10 @@ class Fleet:
     @property
     def sessions(self) -> list[RobotSession]:
         return list(self._sessions.values())
+
+    def skews(self) -> Mapping[str, Skew | None]:
+        """How far the clock of each robot is from the panel's, by the robot's id."""
+        return {s.entry.id if s.entry else "": s.robot.clock.skew for s in self.sessions}
 
     @property
     def state(self) -> TextLike:

@@ -47,10 +47,11 @@ def clock_status(robot: RobotState, now: float) -> ClockStatus:
         return ClockStatus("other_time", say("clock_other_time"), about, say("clock_other_time_do"))
     state: ClockWord = "even" if skew.state == "even" and not apart else "apart"
     reason = _skew_reason(skew) or _apart_reason(skew, apart)
-    return ClockStatus(state, _skew_text(skew), about, reason, skew.seconds, within_s)
+    return ClockStatus(state, skew_text(skew), about, reason, skew.seconds, within_s)
 
 
-def _skew_text(skew: Skew) -> Text:
+def skew_text(skew: Skew) -> Text:
+    """How far a robot's clock is from the panel's."""
     if skew.state == "even":
         return say("clock_even")
     code = "clock_ahead" if skew.seconds > 0 else "clock_behind"

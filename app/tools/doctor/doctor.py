@@ -12,16 +12,19 @@ from app.ros.graph.model import GraphSnapshot
 from app.system.errors import PanelError
 from app.system.settings import Settings
 from app.system.texts import ENGLISH
+from app.system.time_source import read_time_source
 from app.tools.doctor.findings import Report
 from app.tools.doctor.machine import (
     DRM,
     FreeBytes,
     HasBrowser,
     HasFont,
+    ReadTime,
     check_data,
     check_fonts,
     check_port,
     check_screens,
+    check_time,
     free_bytes,
     has_browser,
     has_font,
@@ -42,6 +45,7 @@ class Machine:
     has_browser: HasBrowser = has_browser
     screens: Path = DRM
     free_bytes: FreeBytes = free_bytes
+    read_time: ReadTime = read_time_source
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +76,7 @@ async def diagnose(settings: Settings, options: Options) -> Diagnosis:
     served = check_port(report, options.host, options.port)
     machine = options.machine
     check_data(report, settings.data_folder(mode), panel, served, machine.free_bytes)
+    check_time(report, machine.read_time)
     languages = panel.readers_languages if panel else (ENGLISH,)
     check_fonts(report, languages, machine.has_font, machine.has_browser)
     if panel is not None:

@@ -20,6 +20,7 @@ from app.panel.widgets.tiles import KEY_MM, Screen
 from app.records.data_dir import DataDir
 from app.system.errors import FolderInUse, SettingsError
 from app.system.process.listen_sockets import check_port_free
+from app.system.time_source import TimeSource, read_time_source
 from app.tools.doctor.findings import Report
 
 # What this machine has for the panel's server: its address and port, its data folder and disk.
@@ -33,6 +34,7 @@ ANYWHERE: Final = {"0.0.0.0": "127.0.0.1", "::": "::1", "": "127.0.0.1"}
 UNLISTED: Final = re.compile(r'^kiosk_options_known\{robot="([^"]*)",select="([^"]*)"\} 0\.0$', re.M)
 
 FreeBytes = Callable[[Path], int]
+ReadTime = Callable[[], TimeSource]
 
 
 def free_bytes(folder: Path) -> int:
@@ -138,6 +140,17 @@ def _in_use(report: Report, folder: Path, served: bool) -> bool:
         return False
     data.release()
     return False
+
+
+def check_time(report: Report, read: ReadTime = read_time_source) -> None:
+    """Whether this machine's clock follows a time source."""
+    source = read()
+    if source.synchronised is None:
+        report.find("time_unknown")
+    elif source.synchronised:
+        report.fact(" by ".join(filter(None, ("this machine's clock is synchronised", source.source))))
+    else:
+        report.find("time_unsynchronised")
 
 
 # The sizes of this machine's screens, from their EDID, against what the panel file says of them.

@@ -86,6 +86,8 @@ NOTES: Final = (
     "simulated_clock",
     "clock_unknown",
     "screen_unknown",
+    "time_unsynchronised",
+    "time_unknown",
 )
 
 

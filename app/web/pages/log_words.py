@@ -57,6 +57,7 @@ OUTCOME_WORDS: Final = {
     "place": "log_outcome_place",
     "access": "log_outcome_access",
     "panel": "log_outcome_panel",
+    "clock": "log_outcome_clock",
     "began": "log_outcome_began",
     "changed": "log_outcome_changed",
     "signed": "log_outcome_signed",

@@ -90,7 +90,7 @@ PRESSES: Final = 8  # on the page; the others are counted
 COUNTED: Final = 500  # presses at most
 MARKS: Final = 4
 # Entries that no operator made.
-LEFT_OUT: Final = frozenset({"began", "changed", "signed", "resumed", "removed"})
+LEFT_OUT: Final = frozenset({"began", "changed", "signed", "resumed", "removed", "clock"})
 
 
 class ShownMessage(NamedTuple):

@@ -14,11 +14,14 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.cell.alarms.report import shift_at
 from app.cell.permission.verdict import WITHOUT_CONTROL
+from app.cell.session.fleet import Fleet
+from app.cell.session.machine_watch import time_about, time_text
+from app.cell.view.clock_status import skew_text
 from app.panel.widgets.families import Command, EntryWidget
 from app.records import Entry, Filter, LogRow, OperatorLog
 from app.system.errors import NotFound
 from app.system.printable import printable, printable_texts
-from app.system.texts import Text, TextLike, number, say
+from app.system.texts import Text, TextLike, joined, number, say
 from app.web.app_state import CurrentState
 from app.web.caller import caller_of
 from app.web.downloads import exported
@@ -126,6 +129,7 @@ class LogContext(TypedDict):
     outcomes: tuple[str, ...]
     off: TextLike
     count: TextLike
+    clocks: TextLike
     older: str
     newest: str
     csv: str
@@ -157,6 +161,7 @@ async def page(request: Request, state: CurrentState, form: Annotated[LogQuery, 
         outcomes=tuple(OUTCOME_WORDS),
         off="" if state.log.enabled else say("log_off"),
         count=word("head", count=number(f"{head.count:,d}")) if head else "",
+        clocks=_clocks(state.fleet),
         older=form.query(rows[-1].entry.seq) if more else "",
         newest=form.query() if form.before else "",
         csv=form.query(),
@@ -188,6 +193,23 @@ async def as_csv(request: Request, state: CurrentState, form: Annotated[LogQuery
     return await exported(
         request, lambda gzip: log.export(*arguments, gzip, language), "operator's log"
     )
+
+
+def _clocks(fleet: Fleet) -> TextLike:
+    """What the times of the entries are worth: the panel's own clock, and the robots' against it. Of
+    several robots those that are apart."""
+    if fleet.machine is None:
+        return ""
+    time_now = fleet.machine.now.time
+    parts = [time_text(time_now), time_about(time_now)]
+    skews = fleet.skews()
+    for robot, skew in skews.items():
+        if skew is not None and (len(skews) == 1 or skew.state != "even"):
+            named = fleet.of_robot(robot).entry
+            about = {"robot": named.name} if named is not None else {}
+            code = "log_page_robot_clock" if named is not None else "log_robot_clock"
+            parts.append(say(code, text=skew_text(skew), **about))
+    return joined(parts)
 
 
 def _shown(row: LogRow, language: str) -> LogRow:

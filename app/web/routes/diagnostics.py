@@ -18,6 +18,7 @@ from app.cell.robot.traffic import RoundTripSummary
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.doctor_process import DoctorProcess
 from app.cell.session.looks import Look, Survey, TopicPreview
+from app.cell.session.machine_watch import MachineWatch
 from app.cell.session.session import RobotSession
 from app.cell.view.clock_status import clock_status
 from app.cell.view.diagnostics import (
@@ -50,6 +51,7 @@ from app.web.pages.diagnostics import (
     LookAnswer,
     LookQuery,
     diagnostics_context,
+    machine_rows,
     trip_note,
     versions,
     word,
@@ -111,6 +113,12 @@ def mqtt_json(mqtt: AlarmMqtt) -> dict[str, Any] | None:
         "published": mqtt.published,
         "dropped": mqtt.dropped,
     }
+
+
+def machine_json(watch: MachineWatch | None) -> list[dict[str, Any]]:
+    """The contents of `MachineAnswer`s."""
+    names = ("id", "state", "text", "about", "reason")
+    return [{name: getattr(row, name) for name in names} for row in machine_rows(watch)]
 
 
 def forward_json(forward: "ForwardProcess | None") -> dict[str, Any] | None:
@@ -222,6 +230,7 @@ async def diagnostics(
     content = diagnostics_json(session, await _survey(session), state.doctor, versions())
     content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
     content["forward"] = forward_json(state.fleet.forward)
+    content["machine"] = machine_json(state.fleet.machine)
     return await rows_answer(request, lambda: content, sys.maxsize)
 
 
@@ -302,6 +311,7 @@ async def _page(
         "mqtt": state.fleet.alarms.mqtt,
         "forward": state.fleet.forward.status if state.fleet.forward else None,
         "shared": _shared(request, state, query.robot),
+        "machine_rows": machine_rows(state.fleet.machine),
         "sent_panel": await _sent_panel(state),
     }
     return framed_page(request, state, page, {**context, **TEXTS, **more})

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from app.system.settings import Settings
+from app.system.time_source import TimeSource
 from app.tools.doctor.doctor import Diagnosis, Machine, Options, diagnose
 from app.tools.doctor.findings import Finding
 from tests.support.parts import free_port, zenoh_file
@@ -81,6 +82,7 @@ class Setup:
             "has_font": lambda language: True,
             "has_browser": lambda: True,
             "screens": self.screens,
+            "read_time": lambda: TimeSource(True, "chrony"),
         }
 
     def diagnose(self, text: str, endpoint: str, listen_s: float = LONGEST_S) -> Diagnosis:

@@ -5,13 +5,15 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from app.panel import load_panel
+from app.system.time_source import TimeSource
 from app.tools.cli.command import main
-from app.tools.doctor import machine
+from app.tools.doctor import doctor, machine
 from app.tools.doctor.findings import KINDS, Report
 from app.tools.doctor.machine import (
     MB,
@@ -19,6 +21,7 @@ from app.tools.doctor.machine import (
     check_fonts,
     check_port,
     check_screens,
+    check_time,
     displays,
     has_font,
 )
@@ -233,12 +236,39 @@ def test_a_type_without_definition_and_another_fault(setup: Setup) -> None:
     assert codes(setup, text) == ["type_unknown", "panel_fault"]
 
 
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        (TimeSource(True, "chrony"), []),
+        (TimeSource(False, "chrony"), ["time_unsynchronised"]),
+        (TimeSource(), ["time_unknown"]),
+    ],
+)
+def test_the_clock_follows_a_time_source_or_that_is_a_note(
+    setup: Setup, source: TimeSource, expected: list[str]
+) -> None:
+    setup.machine["read_time"] = lambda: source
+    report = setup.diagnose(panel_of(more='mode = "demo"\n'), "tcp/127.0.0.1:1").report
+    assert report.codes() == [*expected, "demo_mode"]
+    assert report.is_well
+    fact = "this machine's clock is synchronised by chrony"
+    assert (fact in report.facts) is (source.synchronised is True)
+
+
+@pytest.fixture
+def synchronised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clock of this machine, for commands."""
+    read = partial(check_time, read=lambda: TimeSource(True))
+    monkeypatch.setattr(doctor, "check_time", lambda report, _: read(report))
+
+
 def command(setup: Setup, *more: str) -> list[str]:
     setup.panel.write_text(panel_of(more='mode = "demo"\n'))
     where = ["--port", str(setup.port), "--data", str(setup.data)]
     return ["doctor", str(setup.panel), *where, *more]
 
 
+@pytest.mark.usefixtures("synchronised")
 def test_the_command_ends_with_0_where_all_is_well(
     setup: Setup, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -249,7 +279,7 @@ def test_the_command_ends_with_0_where_all_is_well(
     assert "\nAll is well: 1 note, " in said
 
 
-@pytest.mark.usefixtures("another_program")
+@pytest.mark.usefixtures("another_program", "synchronised")
 def test_the_command_ends_with_1_where_something_is_wrong(
     setup: Setup, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -259,7 +289,7 @@ def test_the_command_ends_with_1_where_something_is_wrong(
     assert "\nSomething is wrong: 1 error, 1 note, " in said
 
 
-@pytest.mark.usefixtures("another_program")
+@pytest.mark.usefixtures("another_program", "synchronised")
 def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(command(setup, "--json")) == 1
     diagnosis = json.loads(capsys.readouterr().out)
