@@ -89,12 +89,15 @@ def _not_a_role(group: str) -> str:
 
 class AccessRules(Description):
     """Who may use the panel. `open`: without users, everyone may do everything. A user is signed out
-    after `idle_s` seconds without a touch; 0: never. `groups` are the panel's own, beside the roles.
+    after `idle_s` seconds without a touch, and `longest_s` seconds after the sign-in; 0: never. A user
+    is signed in at `max_sessions` browsers at most. `groups` are the panel's own, beside the roles.
     Signed-in users and programs on other machines have at most the role `remote`. `pin`: PINs are taken
     at the kiosk's own machine only, or anywhere."""
 
     open: bool = True
     idle_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 600.0
+    longest_s: Annotated[float, Field(ge=0, le=2_678_400, allow_inf_nan=False)] = 43_200.0
+    max_sessions: Annotated[int, Field(ge=1, le=100)] = 10
     groups: Annotated[
         tuple[Annotated[Id, AfterValidator(_not_a_role)], ...], Field(strict=False, max_length=20)
     ] = ()

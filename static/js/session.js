@@ -17,16 +17,21 @@ async function report() {
     if (!answer.ok) return;
     const session = await answer.json();
     if (session.user !== who.dataset.user) return session.user ? location.reload() : location.assign(who.href);
-    warn(session.left_s !== null && session.left_s < WARNED_S);
+    warn(session.left_s !== null && session.left_s < WARNED_S, session.ends_by === "longest");
   } catch {
     touched ||= body.includes("true");
   }
 }
 
-/** @param {boolean} soon */
-function warn(soon) {
+/**
+ * @param {boolean} soon
+ * @param {boolean} anyway whatever is touched
+ */
+function warn(soon, anyway) {
   const note = find(document, "#idle");
   if (soon === note.hidden) note.hidden = !soon;
+  const [idle, longest] = note.querySelectorAll("span");
+  if (idle && longest) [idle.hidden, longest.hidden] = [anyway, !anyway];
 }
 
 if (document.querySelector("form[data-confirm-act], main.sign-in")) import("./signin.js").catch(pageGuard.fail);

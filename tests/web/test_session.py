@@ -10,7 +10,16 @@ from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 from tests.support.users import Browsers, add_user, command, log_rows, says, token_of
 
-NOBODY = {"user": "", "role": "viewer", "groups": [], "users": True, "idle_s": 600.0, "left_s": None}
+NOBODY = {
+    "user": "",
+    "role": "viewer",
+    "groups": [],
+    "users": True,
+    "idle_s": 600.0,
+    "longest_s": 43_200.0,
+    "ends_by": None,
+    "left_s": None,
+}
 
 
 @pytest.fixture(scope="module")

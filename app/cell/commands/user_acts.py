@@ -1,4 +1,5 @@
-"""Acts of the page of users: add, change, disable and remove users, make and revoke tokens.
+"""Acts of the page of users: add, change, disable and remove users, make and revoke tokens, end
+sign-ins.
 
 `ActRequest.object` is the name of a user or token, `secrets` what signs in, which is neither logged nor
 kept. `values` has the `role`, the `groups`, and the `version` that the screen showed: a change that was
@@ -32,6 +33,7 @@ from app.system.errors import os_error_text
 from app.system.texts import Text, TextLike, say
 
 TOKEN: Final = "token"
+END: Final = "end"
 REMOVED: Final = "removed"
 
 
@@ -139,6 +141,15 @@ def _secret_of(request: ActRequest) -> str:
     return "changed" if any(request.secrets.get(way) for way in WAYS) else REMOVED
 
 
+def _end_session(access: Access, request: ActRequest) -> Applied:
+    """`request.object` is the handle of a session."""
+    session = access.sessions.of_handle(request.object)
+    if session is None:
+        return Applied(say("users_session_gone"))
+    access.end(session, request.who)
+    return Applied(note=say("users_done_end", name=session.user, where=session.client.address))
+
+
 def _row(plan: Plan, detail: Callable[[ActRequest], str], code: str) -> Act[Access, Applied]:
     # A change that was made has its entry by the file, which also has those of the command line.
     # The word of such an act is that of its change, in `app/cell/people/access_log.py`.
@@ -187,4 +198,6 @@ USER_ACTS: Final[Mapping[str, Act[Access, Applied]]] = {
     "revoke": _row(
         lambda book, p: revoke_token(book, p.name), lambda _: "revoked", "users_done_revoke"
     ),
+    # No change of the users' file: its entry is the act's own, beside that of the sign-out.
+    END: Act("", server_permits, _end_session, lambda applied: applied.note, ENGINEER),
 }

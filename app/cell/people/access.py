@@ -37,7 +37,7 @@ from app.panel.roles import ROLES, VIEWER
 from app.panel.rules import AccessRules
 from app.records.principal import Client, Principal, public_id
 from app.system.limits import BoundedDict
-from app.system.texts import TextLike, say
+from app.system.texts import Text, TextLike, say
 
 # Hashes secrets beside the event loop, on one thread for the kiosk's own machine and one for all
 # others, which has a low priority: a flood of sign-ins delays neither a press nor a sign-in at the
@@ -261,12 +261,14 @@ def _leak_of(key: Key) -> Leak:
 log = logging.getLogger("kiosk.access")
 
 WATCHED_EVERY_S: Final = 0.5
-EndReason = Literal["sign_out", "hand_over", "idle", "changed", "limit"]
+EndReason = Literal["sign_out", "hand_over", "idle", "longest", "changed", "limit", "ended"]
 # Why a session ended that its user did not end.
 END_SENTENCES: Final[Mapping[EndReason, str]] = {
     "idle": "signin_ended_idle",
     "changed": "signin_ended_changed",
     "limit": "signin_ended_limit",
+    "longest": "signin_ended_longest",
+    "ended": "signin_ended_afar",
 }
 MAX_END_REASONS: Final = 1000  # browsers
 PIN_HERE: Final = "sign_in_pin_here"
@@ -309,7 +311,7 @@ class Access:
         """`state` is the folder that keeps which changes of the users are logged; that of the file by
         default."""
         self.rules = rules
-        self.sessions = Sessions(rules.idle_s, monotonic)
+        self.sessions = Sessions(rules.idle_s, monotonic, rules.longest_s, rules.max_sessions)
         self.delays = SignInDelays(monotonic)
         self.checker = SecretChecker(cost or cost_of_machine(memory_of_machine()), monotonic)
         self.log = AccessLogWriter(oplog, state or file.folder)
@@ -320,7 +322,7 @@ class Access:
         self._reader = ThreadPoolExecutor(1, "users")
         self._stamp: Stamp | None = NEVER_READ
         self._monotonic = monotonic
-        self._end_reasons = BoundedDict[str, EndReason](MAX_END_REASONS)  # by client
+        self._end_reasons = BoundedDict[str, Text](MAX_END_REASONS)  # by client
         self._token_requests = RateGuard("token_requests", monotonic=monotonic)
         self._listeners: list[Callable[[Session, EndReason], None]] = []
         self._change_listeners: list[Callable[[], None]] = []
@@ -496,10 +498,16 @@ class Access:
         self.sessions.end(session)
         self._ended(session, "sign_out")
 
-    def end_idle(self) -> None:
-        """Signs out users who have not touched their page for too long."""
-        for session in self.sessions.end_idle():
-            self._ended(session, "idle")
+    def end_due(self) -> None:
+        """Signs out users who have not touched their page for too long, or have the longest time
+        behind them."""
+        for session, reason in self.sessions.end_due():
+            self._ended(session, reason)
+
+    def end(self, session: Session, by: Principal) -> None:
+        """Signs a user out from afar."""
+        self.sessions.end(session)
+        self._ended(session, "ended", by)
 
     def on_end(self, listener: Callable[[Session, EndReason], None]) -> None:
         """`listener` is called when a session has ended, and why."""
@@ -525,14 +533,15 @@ class Access:
 
     def end_reason(self, client: Client) -> TextLike:
         """Why the last session of this browser ended, "" if its user ended it."""
-        reason = self._end_reasons.get(client.id)
-        return say(END_SENTENCES[reason]) if reason else ""
+        return self._end_reasons.get(client.id, "")
 
-    def _ended(self, session: Session, reason: EndReason) -> None:
-        self.log.signed_out(session, reason)
+    def _ended(self, session: Session, reason: EndReason, by: Principal | None = None) -> None:
+        """`by` is who ended it from afar."""
+        self.log.signed_out(session, reason, by)
         self._end_reasons.pop(session.client.id, None)
         if reason in END_SENTENCES:
-            self._end_reasons[session.client.id] = reason
+            names = {"by": by.title} if by is not None else {}
+            self._end_reasons[session.client.id] = say(END_SENTENCES[reason], **names)
         for listener in self._listeners:
             listener(session, reason)
         self._changed()
@@ -543,7 +552,7 @@ class Access:
         try:
             while True:
                 await asyncio.sleep(WATCHED_EVERY_S)
-                self.end_idle()
+                self.end_due()
                 if reading.done():
                     reading.result()
                     reading = asyncio.ensure_future(self.reload())

@@ -60,6 +60,8 @@ SIGN_OUT_SENTENCES: Final = {
     "idle": "log_signed_out_idle",
     "changed": "log_signed_out_changed",
     "limit": "log_signed_out_limit",
+    "longest": "log_signed_out_longest",
+    "ended": "log_signed_out_ended",
 }
 
 
@@ -97,9 +99,11 @@ class AccessLogWriter:
             )
         )
 
-    def signed_out(self, session: Session, reason: str) -> None:
+    def signed_out(self, session: Session, reason: str, by: Principal | None = None) -> None:
+        """`by` is who ended the session from afar."""
         origin = self._places.pop(session.client.id, None) or origin_of(Principal(session.client))
-        sentence = say(SIGN_OUT_SENTENCES[reason], name=session.user)
+        names = {"by": by.title} if by is not None else {}
+        sentence = say(SIGN_OUT_SENTENCES[reason], name=session.user, **names)
         self._add(new_entry("access", origin, reason=sentence, action="sign_out", outcome="accepted"))
 
     def locked(self, reason: TextLike) -> None:

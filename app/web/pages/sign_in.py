@@ -44,7 +44,8 @@ WORDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class SignedIn:
-    """`user` is "" without a sign-in, `name` what the header shows then; `hint` says what to do on a
+    """`user` is "" without a sign-in, `name` what the header shows then; `idle` and `longest` announce
+    the sign-out; `hint` says what to do on a
     panel without users, "" on one with users. `changes_users`: the menu leads to the page of users."""
 
     configured: bool
@@ -53,6 +54,7 @@ class SignedIn:
     role: TextLike
     label: TextLike
     idle: TextLike
+    longest: TextLike
     hint: TextLike
     changes_users: bool
 
@@ -69,6 +71,7 @@ def signed_in(state: AppState, who: Principal) -> SignedIn:
         role,
         say("signin_label", name=name, role=role),
         say("signin_idle"),
+        say("signin_longest"),
         "" if configured else say("signin_no_users"),
         who.role == ENGINEER and (configured or who.client.local),
     )

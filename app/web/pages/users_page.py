@@ -1,6 +1,7 @@
 """The page of users: the list of users or of tokens, one of them, and the forms that change it."""
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final, Literal, TypedDict
@@ -8,31 +9,34 @@ from typing import Any, Final, Literal, TypedDict
 from app.cell.commands.acts import NO_VALUES
 from app.cell.people.access import Access
 from app.cell.people.secrets_hash import WAYS, Way
+from app.cell.people.sessions import Session
 from app.cell.people.users import User
 from app.panel.roles import ENGINEER, OPERATOR, ROLES
 from app.records.principal import Principal
-from app.system.clock import format_datetime
+from app.system.clock import format_age, format_datetime
 from app.system.texts import Param, Text, TextLike, joined, number, say
 from app.web.pages.sign_in import ROLE_WORDS
 
-Mode = Literal["show", "add", "role", "pin", "password", "badge", "remove", "token", "revoke"]
+Mode = Literal["show", "add", "role", "pin", "password", "badge", "remove", "token", "revoke", "end"]
+Listed = Literal["users", "tokens", "sessions"]
 GROUP: Final = "group-"  # stands before the id of a group in a form
-OF_TOKENS: Final = frozenset({"token", "revoke"})
+OF_LISTS: Final[Mapping[str, Listed]] = {"token": "tokens", "revoke": "tokens", "end": "sessions"}
 
 
 @dataclass(frozen=True, slots=True)
 class UserRow:
-    """A user or token in the list."""
+    """A user, token or sign-in in the list. `title` is its name for people, "" where that is `name`."""
 
     name: str
     about: TextLike
     mark: TextLike = ""
+    title: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class SelectedAccount:
-    """The user or token that is shown: its facts as (name, text); `version` is the number of its last
-    change."""
+    """The user, token or sign-in that is shown: its facts as (name, text); `version` is the number of
+    its last change. `title` is its name for people, "" where that is `name`."""
 
     name: str
     role: str
@@ -41,12 +45,13 @@ class SelectedAccount:
     disabled: bool
     facts: list[tuple[Text, TextLike]]
     version: int
+    title: str = ""
 
 
 class UsersContext(TypedDict):
     """The variables of `users.html`, beside those of the frame. `typed` is what a refused form had."""
 
-    tokens: bool
+    listed: Listed
     mode: Mode
     rows: list[UserRow]
     count: Text
@@ -69,27 +74,27 @@ def users_context(
     groups: Sequence[str],
     who: Principal,
     name: str,
-    tokens: bool,
+    listed: Listed,
     mode: Mode,
     said: TextLike = "",
     refused: Mapping[str, str] = NO_VALUES,
     token: str = "",
 ) -> UsersContext:
-    """What the page shows now. `name` is that of the chosen user or token, `refused` what was
+    """What the page shows now. `name` is that of the chosen user, token or sign-in, `refused` what was
     typed in a form that is shown again, `token` one that was made just now."""
-    tokens = tokens or mode in OF_TOKENS
-    book = access.book
-    rows = _token_rows(access) if tokens else [_row(user, who) for user in book.users]
+    listed = OF_LISTS.get(mode, listed)
+    rows_of, details = LISTS[listed]
+    rows = rows_of(access, who)
     names = [row.name for row in rows]
     shown = name if name in names else next(iter(names), "") if not name else ""
-    chosen = (_token if tokens else _user)(access, shown) if shown else None
+    chosen = details(access, shown) if shown else None
     if not access.configured and mode == "show":
         mode = "add"
     needs_one = mode not in ("show", "add", "token")
     typed = _typed(refused, chosen if mode == "role" else None, ENGINEER if not rows else OPERATOR)
     of_user = chosen.groups if chosen else ()
     return UsersContext(
-        tokens=tokens,
+        listed=listed,
         mode="show" if needs_one and chosen is None else mode,
         rows=rows,
         count=word("count", count=number(str(len(rows)))),
@@ -121,7 +126,43 @@ def _row(user: User, who: Principal) -> UserRow:
     return UserRow(user.name, _role(user.role, user.groups), mark)
 
 
-def _token_rows(access: Access) -> list[UserRow]:
+def _user_rows(access: Access, who: Principal) -> list[UserRow]:
+    return [_row(user, who) for user in access.book.users]
+
+
+def _session_rows(access: Access, who: Principal) -> list[UserRow]:
+    """The newest touch first."""
+    rows = []
+    for session in reversed([*access.sessions]):
+        is_own = session.client.id == who.client.id
+        rows.append(
+            UserRow(session.handle, _where(session), word("you") if is_own else "", session.user)
+        )
+    return rows
+
+
+def _where(session: Session) -> TextLike:
+    client = session.client
+    return client.name if client.local else joined((client.name, client.address), "between_names")
+
+
+def _session(access: Access, handle: str) -> SelectedAccount | None:
+    session = access.sessions.of_handle(handle)
+    if session is None:
+        return None
+    began_s, touched_s = access.sessions.seen_s(session)
+    principal = access.principal(session.client, session.id)
+    facts: list[tuple[Text, TextLike]] = [
+        (word("role"), _role(principal.role, sorted(principal.groups))),
+        (word("where"), _where(session)),
+        (word("since"), format_datetime(time.time() - began_s)),
+        (word("touched"), word("ago", age=format_age(touched_s))),
+    ]
+    about = (principal.role, (), (), False, facts, 0, session.user)
+    return SelectedAccount(handle, *about)
+
+
+def _token_rows(access: Access, _: Principal) -> list[UserRow]:
     return [UserRow(token.name, ROLE_WORDS[token.role]) for token in access.book.tokens]
 
 
@@ -168,3 +209,12 @@ def _time(text: str) -> TextLike:
         return format_datetime(datetime.fromisoformat(text).timestamp())
     except ValueError:
         return text
+
+
+Rows = Callable[[Access, Principal], list[UserRow]]
+Details = Callable[[Access, str], SelectedAccount | None]
+LISTS: Final[Mapping[Listed, tuple[Rows, Details]]] = {
+    "users": (_user_rows, _user),
+    "tokens": (_token_rows, _token),
+    "sessions": (_session_rows, _session),
+}

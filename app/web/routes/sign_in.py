@@ -1,7 +1,7 @@
 """Sign in and sign out: the page of sign-in, and sign-in by the plant's OpenID Connect provider."""
 
 import secrets
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
@@ -88,13 +88,16 @@ class Touch(BaseModel):
 
 class SessionAnswer(BaseModel):
     """Who is signed in: `user` is "" for no one. `idle_s`: seconds without a touch until the sign-out,
-    0 for never; `left_s` those that are left. `users`: whether the panel has users."""
+    `longest_s` those after the sign-in, 0 for never; `left_s` those that are left, and which of the two
+    they are of. `users`: whether the panel has users."""
 
     user: str
     role: Annotated[str, Field(json_schema_extra={"enum": list(ROLES)})]
     groups: list[str]
     users: bool
     idle_s: float
+    longest_s: float
+    ends_by: Literal["idle", "longest"] | None
     left_s: float | None
 
 
@@ -245,6 +248,8 @@ def _about(state: AppState, who: Caller) -> JSONResponse:
         "groups": sorted(principal.groups),
         "users": state.access.configured,
         "idle_s": state.access.rules.idle_s,
+        "longest_s": state.access.rules.longest_s,
+        "ends_by": state.access.sessions.ends_by(session) if session else None,
         "left_s": None if left_s in (None, float("inf")) else round(left_s or 0.0, 1),
     }
     return JSONResponse(content, headers={"cache-control": "no-store"})

@@ -1,5 +1,6 @@
-"""The engineer's page of users and tokens, the same as JSON, and the acts on them."""
+"""The engineer's page of users, tokens and sign-ins, the same as JSON, and the acts on them."""
 
+import time
 from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Final
@@ -11,11 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.cell.commands.acts import ActReceipt
 from app.cell.commands.press import PRESS_ID
-from app.cell.commands.user_acts import TOKEN, USER_ACTS
+from app.cell.commands.user_acts import END, TOKEN, USER_ACTS
+from app.cell.people.access import Access
 from app.cell.people.edits import tokens_json, users_json
 from app.cell.people.secrets_hash import LONGEST, WAYS, new_api_token
 from app.cell.people.users import LONGEST_NAME
 from app.panel.roles import ROLES
+from app.system.clock import iso_time
 from app.system.texts import TextLike
 from app.web.acts import ActBody, act_responses, refused_form, said_of, sent_act
 from app.web.answers import ActAnswer
@@ -23,7 +26,7 @@ from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
 from app.web.large_answers import rows_answer
 from app.web.pages.context import FramedPage, framed_page
-from app.web.pages.users_page import GROUP, Mode, users_context, word
+from app.web.pages.users_page import GROUP, OF_LISTS, Listed, Mode, users_context, word
 from app.web.requests import PAGE, SINCE, FormFields, described_body, errors
 
 router = APIRouter()
@@ -55,6 +58,7 @@ class UsersQuery(BaseModel):
 
     name: UserName = ""
     tokens: bool = False
+    sessions: bool = False
     mode: Mode = "show"
     act: Annotated[str, Field(max_length=400)] = ""
 
@@ -105,15 +109,28 @@ class ListedToken(BaseModel):
     last_used: str | None
 
 
+class ListedSession(BaseModel):
+    """A sign-in: `id` is what the act `end` takes as `name`. Times are ISO 8601."""
+
+    id: str
+    user: str
+    role: str
+    address: str
+    browser: str
+    since: str
+    touched: str
+
+
 class UsersAnswer(BaseModel):
     users: list[ListedUser]
     tokens: list[ListedToken]
+    sessions: list[ListedSession]
 
 
 @router.get(
     "/users",
     response_model=UsersAnswer,
-    summary="Users and tokens: a page for browsers, else as JSON",
+    summary="Users, tokens and sign-ins: a page for browsers, else as JSON",
     responses=errors(403, 422) | {200: {"content": PAGE}},
 )
 async def users(
@@ -122,14 +139,37 @@ async def users(
     if caller_of(request).accepts_html:
         return _page(request, state, query)
     book, last = state.access.book, state.access.log.last
-    content = {"users": users_json(book, last), "tokens": tokens_json(book, last)}
+    content = {
+        "users": users_json(book, last),
+        "tokens": tokens_json(book, last),
+        "sessions": _sessions_json(state.access),
+    }
     return await rows_answer(request, lambda: content, len(book.users))
+
+
+def _sessions_json(access: Access) -> list[dict[str, str]]:
+    rows = []
+    for session in access.sessions:
+        began_s, touched_s = access.sessions.seen_s(session)
+        client, now = session.client, time.time()
+        rows.append(
+            {
+                "id": session.handle,
+                "user": session.user,
+                "role": access.principal(client, session.id).role,
+                "address": client.address,
+                "browser": client.id,
+                "since": iso_time(now - began_s),
+                "touched": iso_time(now - touched_s),
+            }
+        )
+    return rows
 
 
 @router.post(
     "/users/{act}",
     response_model=UserReceipt,
-    summary="Add, change or remove a user, or make or revoke a token",
+    summary="Add, change or remove a user, make or revoke a token, or end a sign-in",
     responses=act_responses(UserReceipt)
     | {200: {"content": PAGE, "description": "also of a form that made a token: the page that has it"}},
     openapi_extra=described_body(UserActBody, ACT_FORM.schema, required=False),
@@ -171,10 +211,11 @@ def _form_body(act: str, form: Mapping[str, str]) -> dict[str, Any]:
 
 def _shown(act: str, name: str, receipt: ActReceipt) -> dict[str, str]:
     """The query of the page after a form: whom it shows, and the form again if it was refused."""
-    shown = {"tokens": "true"} if act in (TOKEN, "revoke") else {}
-    if name and not (receipt.done and act in ("remove", "revoke")):
+    listed = OF_LISTS.get(act)
+    shown: dict[str, str] = {listed: "true"} if listed else {}
+    if name and not (receipt.done and act in ("remove", "revoke", END)):
         shown["name"] = name
-    if not receipt.done and act not in ("disable", "enable"):
+    if not receipt.done and act not in ("disable", "enable", END):
         shown["mode"] = act
     return shown
 
@@ -189,7 +230,8 @@ def _page(
         said = word("token_gone")
     typed = refused_form(request, state).typed
     rules, who = state.fleet.panel.access, caller_of(request).principal
-    about = (rules.groups, who, query.name, query.tokens, query.mode, said, typed, token)
+    listed: Listed = "tokens" if query.tokens else "sessions" if query.sessions else "users"
+    about = (rules.groups, who, query.name, listed, query.mode, said, typed, token)
     context = {**users_context(state.access, *about), "word": word}
     page = FramedPage("users.html", word("title"), "/users")
     return framed_page(request, state, page, context)
