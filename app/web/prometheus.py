@@ -20,7 +20,7 @@ from app.cell.permission.robot_options import options_now
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.alarms import Alarms
 from app.cell.session.fleet import Fleet
-from app.cell.session.machine_watch import Machine
+from app.cell.view.machine_status import Machine
 
 if TYPE_CHECKING:
     from app.cell.forward.status import ForwardStatus
@@ -100,6 +100,10 @@ def _of_machine(machine: Machine) -> Iterator[Metric]:
     if machine.time.within_s is not None:
         error.add_metric([], machine.time.within_s)
     yield error
+    if machine.weaknesses is not None and not machine.weaknesses.fault:
+        about = "Known weaknesses that concern what is installed, by the VEX file"
+        affected = len(machine.weaknesses.affected)
+        yield GaugeMetricFamily("kiosk_weaknesses", about, value=affected)
 
 
 def _of_mqtt(mqtt: AlarmMqtt) -> Iterator[Metric]:

@@ -116,7 +116,9 @@ async def open_fleet(
         site = _site_summary(settings, panel, fleet)
         states = _state_recorder(fleet, fleet.states, panel)
         fleet.forward = _forward(settings, panel)
-        machine = keep_running(partial(_watch_machine, fleet, oplog), log, "the machine is not watched")
+        machine = keep_running(
+            partial(_watch_machine, fleet, oplog, settings), log, "the machine is not watched"
+        )
         try:
             if recordings is not None:
                 recordings.start()
@@ -173,13 +175,17 @@ def _state_recorder(fleet: Fleet, path: Path, panel: Panel) -> StateRecorder | N
     return StateRecorder(path, fleet.sessions, partial(ask_reason, fleet))
 
 
-async def _watch_machine(fleet: Fleet, oplog: OperatorLog | NullLog) -> None:
+async def _watch_machine(fleet: Fleet, oplog: OperatorLog | NullLog, settings: Settings) -> None:
     """Begins, and is imported, after the first page."""
     await asyncio.sleep(MACHINE_AFTER_S)
     await asyncio.to_thread(import_module, "app.cell.session.machine_watch")
-    from app.cell.session.machine_watch import MachineWatch
+    from app.cell.session.machine_watch import MachineReader, MachineWatch
+    from app.system import minisign
 
-    fleet.machine = fleet.machine or MachineWatch(oplog, fleet.skews)
+    if fleet.machine is None:
+        data = settings.data_folder(mode_of(settings, fleet.panel))
+        reader = MachineReader((settings.panel.parent, data), Path(minisign.PINNED))
+        fleet.machine = MachineWatch(oplog, fleet.skews, reader.read)
     await fleet.machine.run()
 
 

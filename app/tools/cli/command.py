@@ -61,6 +61,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "doctor": Command("find out what is wrong between a panel, this machine and the robot", "doctor"),
     "support": Command("collect what support needs to know in a zip file", "support"),
     "manual": Command("write the printable manual of a panel", "manual"),
+    "sbom": Command("list what is installed, and check it against a VEX file", "sbom"),
     "backup": Command("write the data and the panel file of a panel to a zip file", "backup"),
     "restore": Command("put the data of a backup in place", "restore"),
     "forward": Command("send what the cell keeps to the plant's central database", "forward"),

@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.system.errors import SettingsError
+from app.system.minisign import PINNED, SIGNATURE_SUFFIX, check_signed, parse_keys
 from app.tools.cli.install import add_root, add_wheels, exit_status, print_progress
 from app.tools.cli.parser import Parser
 from app.tools.install.host import Host
-from app.tools.install.release import PINNED, SIGNATURE_SUFFIX, check_wheel, checked_wheel, parse_keys
+from app.tools.install.release import checked_wheel
 from app.tools.install.update import URL, SystemdServices, Updater
 
 PROG = "python -m app.cli update"
@@ -69,7 +70,7 @@ def _signed_by(wheel: Path, copy: Path, host: Host) -> str:
     signature = wheel.with_name(wheel.name + SIGNATURE_SUFFIX)
     if signature.is_file():
         shutil.copyfile(signature, copy.with_name(copy.name + SIGNATURE_SUFFIX))
-    return check_wheel(copy, keys)
+    return check_signed(copy, keys)
 
 
 def _url(text: str) -> str:

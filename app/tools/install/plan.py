@@ -9,17 +9,16 @@ from typing import Final
 
 from app.ros.dialects.dialect import WITHOUT_BRIDGE
 from app.system.errors import SettingsError
+from app.system.minisign import PINNED, parse_keys
 from app.tools.install.host import Host, release_of
 from app.tools.install.panel_files import copies_for, users_file
 from app.tools.install.release import (
-    PINNED,
     RELEASES,
     Assets,
     CheckedPanel,
     Current,
     Release,
     own_wheel,
-    parse_keys,
 )
 from app.tools.install.steps import (
     InstallStep,

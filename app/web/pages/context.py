@@ -23,7 +23,7 @@ from app.cell.view.view import View, audience, audience_of
 from app.panel.frame_keys import FrameKey, frame_keys
 from app.panel.layout import FRAME_OF_ALL, FRAME_ONLY, FRAMES, Page
 from app.panel.model import Panel
-from app.panel.roles import OPERATOR
+from app.panel.roles import MAINTENANCE, OPERATOR
 from app.panel.widgets.families import BaseWidget, Command
 from app.panel.widgets.key_parts import confirmation_of
 from app.records.entry import GOOD_OUTCOMES
@@ -154,6 +154,7 @@ class PageContext(TypedDict):
     frame_keys: Sequence[FrameKey]
     good_outcomes: Collection[str]
     wall_now: Mapping[str, Any]
+    notes: Sequence[TextLike]
 
 
 def page_context(
@@ -213,6 +214,7 @@ def page_context(
         frame_keys=[*frame_keys(panel, session.entry.id if session.entry else None, page.id)],
         good_outcomes=GOOD_OUTCOMES,
         wall_now=_wall_now(state),
+        notes=_notes(state, who),
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
@@ -260,6 +262,15 @@ def _wall_now(state: AppState) -> Mapping[str, Any]:
     from app.web.pages.wall import header_of
 
     return header_of(state.wall)
+
+
+def _notes(state: AppState, who: Principal) -> Sequence[TextLike]:
+    """What those who maintain the panel are told of its PC. Imported only where it is watched."""
+    if state.fleet.machine is None or not who.meets(MAINTENANCE):
+        return ()
+    from app.cell.view.machine_status import machine_notes
+
+    return [*machine_notes(state.fleet.machine.now)]
 
 
 def _faded(receipt: Receipt | None) -> Receipt | None:

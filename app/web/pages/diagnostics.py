@@ -13,12 +13,6 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 from app.cell.robot.traffic import MAX_COLUMNS, RoundTripSummary
 from app.cell.session.doctor_process import DoctorProcess, FoundFault
 from app.cell.session.looks import Look, NodeRoundTrips, Survey
-from app.cell.session.machine_watch import (
-    Machine,
-    MachineWatch,
-    time_about,
-    time_remedy,
-)
 from app.cell.session.session import RobotSession
 from app.cell.view.clock_status import ClockStatus, ClockWord, clock_note, clock_status
 from app.cell.view.diagnostics import (
@@ -100,33 +94,6 @@ def clock_mark(status: ClockStatus) -> str:
     if status.state == "simulated":
         return "note"
     return "ok" if status.state == "even" else "problem"
-
-
-@dataclass(frozen=True, slots=True)
-class MachineRow:
-    """What is known of the panel's own PC: `id` names the row, `state` is "ok", "problem" or
-    "unknown"."""
-
-    id: str
-    state: Literal["ok", "problem", "unknown"]
-    title: Text
-    text: TextLike
-    about: TextLike = ""
-    reason: TextLike = ""
-
-
-def machine_rows(watch: MachineWatch | None) -> list[MachineRow]:
-    """Without a watch, as on a wall, none."""
-    return [_time_row(watch.now)] if watch is not None else []
-
-
-def _time_row(machine: Machine) -> MachineRow:
-    source = machine.time
-    name = {None: "time_unknown", True: "time_yes", False: "time_no"}[source.synchronised]
-    states: dict[bool | None, Literal["ok", "problem", "unknown"]]
-    states = {None: "unknown", True: "ok", False: "problem"}
-    state = states[source.synchronised]
-    return MachineRow("time", state, word("time"), word(name), time_about(source), time_remedy(source))
 
 
 def rate_text(rate_hz: float | None) -> TextLike:
@@ -444,7 +411,8 @@ class ForwardAnswer(BaseModel):
 
 
 class MachineAnswer(BaseModel):
-    """What is known of the panel's own PC, by `id`: "time" is its clock. `reason` is what to do, ""
+    """What is known of the panel's own PC, by `id`: "time" is its clock, "weaknesses" what
+    a VEX file says. `reason` is what to do, ""
     for nothing."""
 
     id: str

@@ -37,6 +37,7 @@ ACTION_WORDS: Final = {
     **{action: word for action, _, word in HAND_OVERS.values()},
     "panel_kept": "log_page_panel_kept",
     "panel_restored": "log_page_panel_restored",
+    "diagnostics_vex": "diagnostics_vex",
 }
 OUTCOME_WORDS: Final = {
     "published": "log_outcome_published",

@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.cell.alarms.report import shift_at
 from app.cell.permission.verdict import WITHOUT_CONTROL
 from app.cell.session.fleet import Fleet
-from app.cell.session.machine_watch import time_about, time_text
 from app.cell.view.clock_status import skew_text
+from app.cell.view.machine_status import time_about, time_text
 from app.panel.widgets.families import Command, EntryWidget
 from app.records import Entry, Filter, LogRow, OperatorLog
 from app.system.errors import NotFound

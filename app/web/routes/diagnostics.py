@@ -18,7 +18,6 @@ from app.cell.robot.traffic import RoundTripSummary
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.doctor_process import DoctorProcess
 from app.cell.session.looks import Look, Survey, TopicPreview
-from app.cell.session.machine_watch import MachineWatch
 from app.cell.session.session import RobotSession
 from app.cell.view.clock_status import clock_status
 from app.cell.view.diagnostics import (
@@ -31,6 +30,7 @@ from app.cell.view.diagnostics import (
     topic_rows,
 )
 from app.cell.view.link_status import LinkStatus
+from app.cell.view.machine_status import MachineRow, machine_rows
 from app.ros.graph.model import SurveyedTopic, topic_forwarding
 from app.ros.messages.names import Qos
 from app.system.clock import iso_time
@@ -51,7 +51,6 @@ from app.web.pages.diagnostics import (
     LookAnswer,
     LookQuery,
     diagnostics_context,
-    machine_rows,
     trip_note,
     versions,
     word,
@@ -115,10 +114,16 @@ def mqtt_json(mqtt: AlarmMqtt) -> dict[str, Any] | None:
     }
 
 
-def machine_json(watch: MachineWatch | None) -> list[dict[str, Any]]:
+def rows_of_machine(state: AppState) -> list[MachineRow]:
+    """None on a wall, and in the first seconds."""
+    watch = state.fleet.machine
+    return [*machine_rows(watch.now)] if watch is not None else []
+
+
+def machine_json(state: AppState) -> list[dict[str, Any]]:
     """The contents of `MachineAnswer`s."""
     names = ("id", "state", "text", "about", "reason")
-    return [{name: getattr(row, name) for name in names} for row in machine_rows(watch)]
+    return [{name: getattr(row, name) for name in names} for row in rows_of_machine(state)]
 
 
 def forward_json(forward: "ForwardProcess | None") -> dict[str, Any] | None:
@@ -230,7 +235,7 @@ async def diagnostics(
     content = diagnostics_json(session, await _survey(session), state.doctor, versions())
     content["mqtt"] = mqtt_json(state.fleet.alarms.mqtt)
     content["forward"] = forward_json(state.fleet.forward)
-    content["machine"] = machine_json(state.fleet.machine)
+    content["machine"] = machine_json(state)
     return await rows_answer(request, lambda: content, sys.maxsize)
 
 
@@ -311,7 +316,7 @@ async def _page(
         "mqtt": state.fleet.alarms.mqtt,
         "forward": state.fleet.forward.status if state.fleet.forward else None,
         "shared": _shared(request, state, query.robot),
-        "machine_rows": machine_rows(state.fleet.machine),
+        "machine_rows": rows_of_machine(state),
         "sent_panel": await _sent_panel(state),
     }
     return framed_page(request, state, page, {**context, **TEXTS, **more})

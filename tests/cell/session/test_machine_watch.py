@@ -4,7 +4,8 @@ import json
 from typing import Any
 
 from app.cell.robot.clocks import Skew
-from app.cell.session.machine_watch import Machine, MachineWatch
+from app.cell.session.machine_watch import MachineWatch
+from app.cell.view.machine_status import Machine
 from app.records.entry import Entry
 from app.system.errors import LogError
 from app.system.texts import Text, text_in
@@ -33,7 +34,7 @@ class Watched:
     def __init__(self) -> None:
         self.log = Log()
         self.skews: dict[str, Skew | None] = {}
-        self.watch = MachineWatch(self.log, lambda: self.skews)
+        self.watch = MachineWatch(self.log, lambda: self.skews, Machine)
 
     def look(self, time: TimeSource | None = None) -> list[tuple[str, dict[str, Any]]]:
         if time is not None:

@@ -11,17 +11,17 @@ from typing import Any
 import pytest
 
 from app.system.errors import SettingsError
-from app.tools.cli.command import main
-from app.tools.cli.update import signed_copy
-from app.tools.install.host import Host
-from app.tools.install.release import (
+from app.system.minisign import (
     PINNED,
     SIGNATURE_SUFFIX,
     PublicKey,
-    check_wheel,
+    check_signed,
     parse_keys,
     parse_signature,
 )
+from app.tools.cli.command import main
+from app.tools.cli.update import signed_copy
+from app.tools.install.host import Host
 from deploy import release
 from tests.tools.install.test_plan import make_wheel
 
@@ -60,7 +60,7 @@ def wheel(tmp_path: Path) -> Path:
 
 
 def check(wheel: Path, *signers: Signer) -> str:
-    return check_wheel(wheel, parse_keys("".join(each.text for each in signers), "keys"))
+    return check_signed(wheel, parse_keys("".join(each.text for each in signers), "keys"))
 
 
 def test_control_characters_of_a_comment_are_printed_as_escapes(signer: Signer, wheel: Path) -> None:
@@ -250,7 +250,7 @@ def test_a_release_is_signed_as_an_update_checks_it(signer: Signer, wheel: Path)
     release.write_sums(wheel.parent)
     release.sign(wheel.parent, wheel, str(signer.secret))
     assert release.digest(wheel) in check(wheel, signer)
-    assert check_wheel(wheel.parent / "SHA256SUMS", parse_keys(signer.text, "keys"))
+    assert check_signed(wheel.parent / "SHA256SUMS", parse_keys(signer.text, "keys"))
     release.empty(wheel.parent)
     assert list(wheel.parent.iterdir()) == []
 
