@@ -147,6 +147,7 @@ ROWS: Final = (
     Row("/users/remove", {"name": "Ito"}, code="users_unknown"),
     Row("/users/token", {"name": "mes", "role": "viewer"}),
     Row("/users/revoke", {"name": "mes"}),
+    Row("/users/end", {"name": "0" * 16}, code="users_session_gone"),
     _edit("create", name="Carton", values=RECIPE),
     _edit("create", "recipe_name_taken", name="Carton", values=RECIPE),
     _edit("save", recipe="carton", version=1, values={**RECIPE, "length": 500}),
