@@ -28,6 +28,7 @@ from typing import Any, Final
 from tests.faults.net import KIOSK_IP, ROBOT_IP, Cable
 from tests.support.cells import Cells, alarm
 from tests.support.parts import ROOT, free_port
+from tests.support.rmw import router_file
 
 QUICK: Final = bool(os.environ.get("QUICK"))
 MEASURED_S: Final = 5.0 if QUICK else 20.0
@@ -98,19 +99,6 @@ def ready(url: str) -> bool:
         page(f"{url}/readyz")
         return True
     return False
-
-
-def router_file(folder: Path, name: str, listen: str, connect: Sequence[str]) -> Path:
-    file = folder / f"{name}.json5"
-    config = {
-        "mode": "router",
-        "listen": {"endpoints": [listen]},
-        "connect": {"endpoints": list(connect)},
-        "scouting": {"multicast": {"enabled": False}},
-        "transport": {"link": {"tx": {"lease": 2000, "keep_alive": 4}}},
-    }
-    file.write_text(json.dumps(config))
-    return file
 
 
 def router(file: Path, before: Sequence[str] = ()) -> Program:

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import pytest
 
-from tests.support.parts import ROOT, Bridge, RosNode, Server, free_port, until
-from tests.support.rmw import Router
+from tests.support.parts import ROOT, Bridge, RosNode, Server, client_file, free_port, until
+from tests.support.rmw import LinkedRouters
 
 PANEL: Final = """
 title = "Cell"
@@ -35,37 +35,12 @@ CHANGE_OVER_S: Final = 8.0
 PAUSE_S: Final = 0.05  # between two presses
 
 
-class LinkedRouters:
-    """Two routers that are connected to each other."""
-
-    def __init__(self, folder: Path) -> None:
-        self.routers = [Router(), Router()]
-        for number, router in enumerate(self.routers):
-            other = self.routers[1 - number].endpoint
-            file = folder / f"router{number}.json5"
-            config = {
-                "mode": "router",
-                "listen": {"endpoints": [router.endpoint]},
-                "connect": {"endpoints": [other]},
-                "scouting": {"multicast": {"enabled": False}},
-                "transport": {"link": {"tx": {"lease": 2000}}},
-            }
-            file.write_text(json.dumps(config))
-            router.configure(file)
-
-    @property
-    def endpoints(self) -> list[str]:
-        return [router.endpoint for router in self.routers]
-
-
 @pytest.fixture
 def routers(tmp_path: Path) -> Iterator[LinkedRouters]:
     mine = LinkedRouters(tmp_path)
-    for router in mine.routers:
-        router.start()
+    mine.start()
     yield mine
-    for router in mine.routers:
-        router.end()
+    mine.end()
 
 
 @pytest.fixture
@@ -84,15 +59,9 @@ def robot(domain: int, routers: LinkedRouters) -> Iterator[RosNode]:
 
 @pytest.fixture
 def panel(routers: LinkedRouters, tmp_path: Path) -> Iterator[Server]:
-    file, zenoh = tmp_path / "cell.toml", tmp_path / "zenoh.json5"
+    file = tmp_path / "cell.toml"
     file.write_text(PANEL)
-    config = {
-        "mode": "client",
-        "connect": {"endpoints": routers.endpoints},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {"link": {"tx": {"lease": 2000, "keep_alive": 4}}},
-    }
-    zenoh.write_text(json.dumps(config))
+    zenoh = client_file(tmp_path, *routers.endpoints)
     environment = {"KIOSK_PANEL": str(file), "KIOSK_ZENOH": str(zenoh), "KIOSK_MODE": "live"}
     with Server(ROOT, free_port(), **environment) as mine:
         yield mine
@@ -110,7 +79,9 @@ class Presser:
         """The outcome."""
         word = f"{self._name}-{len(self.receipts)}"
         body = {"inputs": {"message": word}, "id": f"press-{word}"}
-        receipt: dict[str, Any] = self._server.http.post("/widgets/say", json=body).json()
+        receipt: dict[str, Any] = self._server.http.post(
+            f"{self._server.base}/widgets/say", json=body
+        ).json()
         self.receipts[word] = receipt
         if receipt["outcome"] != "published":
             self.open_at = 0.0

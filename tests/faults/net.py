@@ -47,6 +47,13 @@ class Namespace:
         assert self._holder.stdout is not None
         assert self._holder.stdout.readline() == "up\n", "no network namespace here"
 
+    @classmethod
+    def begun(cls, stack: ExitStack) -> "Namespace":
+        """One that ends with the stack."""
+        namespace = cls()
+        stack.callback(namespace.end)
+        return namespace
+
     @property
     def pid(self) -> int:
         return self._holder.pid
@@ -82,7 +89,7 @@ class Cable:
 
     def __init__(self) -> None:
         with ExitStack() as stack:
-            self.kiosk, self._middle, self.robot = (self._begun(stack) for _ in range(3))
+            self.kiosk, self._middle, self.robot = (Namespace.begun(stack) for _ in range(3))
             self._plug(self.kiosk, "kiosk", KIOSK_IP)
             self._plug(self.robot, "robot", ROBOT_IP)
             self._wire = subprocess.Popen(
@@ -91,12 +98,6 @@ class Cable:
             )  # fmt: skip
             stack.callback(self._end_wire)
             self._stack = stack.pop_all()
-
-    @staticmethod
-    def _begun(stack: ExitStack) -> Namespace:
-        namespace = Namespace()
-        stack.callback(namespace.end)
-        return namespace
 
     def _plug(self, side: Namespace, name: str, ip: str) -> None:
         there = ["peer", "name", "eth0", "netns", str(side.pid)]
@@ -125,6 +126,40 @@ class Cable:
         assert self._wire.stdin is not None
         self._wire.stdin.write(json.dumps({"delay_s": delay_s, "loss": loss}) + "\n")
         self._wire.stdin.flush()
+
+    def end(self) -> None:
+        self._stack.close()
+
+
+class Ring:
+    """Three namespaces, `panel`, `first` and `second`, each two with a cable of their own."""
+
+    FIRST: Final = "10.98.1.2"  # as the panel reaches it
+    SECOND: Final = "10.98.2.2"
+    BETWEEN: Final = "10.98.3.2"  # the first one, as the second reaches it
+
+    def __init__(self) -> None:
+        with ExitStack() as stack:
+            self.panel, self.first, self.second = (Namespace.begun(stack) for _ in range(3))
+            self._plug((self.panel, "to-first", "10.98.1.1"), (self.first, "to-panel", self.FIRST))
+            self._plug((self.panel, "to-second", "10.98.2.1"), (self.second, "to-panel", self.SECOND))
+            self._plug((self.second, "to-first", "10.98.3.1"), (self.first, "to-second", self.BETWEEN))
+            self._stack = stack.pop_all()
+
+    @staticmethod
+    def _plug(near: tuple[Namespace, str, str], far: tuple[Namespace, str, str]) -> None:
+        peer = ("peer", "name", far[1], "netns", str(far[0].pid))
+        near[0].run("ip", "link", "add", near[1], "type", "veth", *peer)
+        for side, interface, ip in (near, far):
+            side.run("ip", "address", "add", f"{ip}/30", "dev", interface)
+            side.run("ip", "link", "set", interface, "up")
+
+    def cut(self) -> None:
+        """Pulls the cable between the panel and the first corner."""
+        self.first.run("ip", "link", "set", "to-panel", "down")
+
+    def plug(self) -> None:
+        self.first.run("ip", "link", "set", "to-panel", "up")
 
     def end(self) -> None:
         self._stack.close()

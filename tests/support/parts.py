@@ -538,6 +538,16 @@ def zenoh_file(folder: Path, endpoint: str) -> Path:
     return path
 
 
+def client_file(folder: Path, *endpoints: str) -> Path:
+    """The shipped zenoh.json5 as that of a client of these routers."""
+    shipped = (ROOT / "zenoh.json5").read_text()
+    path = folder / "zenoh.json5"
+    path.write_text(
+        shipped.replace('["tcp/127.0.0.1:7447"]', json.dumps(endpoints)).replace('"peer"', '"client"')
+    )
+    return path
+
+
 def live(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
     """A server in live mode behind a bridge, with the reference system's panel unless the environment
     names another."""

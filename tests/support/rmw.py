@@ -1,8 +1,9 @@
 """A robot on rmw_zenoh for the tests: its router and its nodes, each a process, with the same commands
 as the bridge and the rclpy nodes of `tests/support/parts.py`."""
 
+import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,42 @@ def router_without_admin_space(folder: Path) -> Router:
     file.write_text(f'{{ mode: "router", listen: {{ endpoints: ["{mine.endpoint}"] }}, {scouting} }}')
     mine.configure(file)
     return mine
+
+
+def router_file(folder: Path, name: str, listen: str, connect: Sequence[str] = ()) -> Path:
+    """The configuration of a plant's router, which notices after 2 s that another one is silent."""
+    file = folder / f"{name}.json5"
+    config = {
+        "mode": "router",
+        "listen": {"endpoints": [listen]},
+        "connect": {"endpoints": list(connect)},
+        "scouting": {"multicast": {"enabled": False}},
+        "transport": {"link": {"tx": {"lease": 2000, "keep_alive": 4}}},
+    }
+    file.write_text(json.dumps(config))
+    return file
+
+
+class LinkedRouters:
+    """Two routers that are connected to each other, from `start` to `end`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.routers = [Router(), Router()]
+        for number, router in enumerate(self.routers):
+            other = self.routers[1 - number].endpoint
+            router.configure(router_file(folder, f"router{number}", router.endpoint, [other]))
+
+    @property
+    def endpoints(self) -> list[str]:
+        return [router.endpoint for router in self.routers]
+
+    def start(self) -> None:
+        for router in self.routers:
+            router.start()
+
+    def end(self) -> None:
+        for router in self.routers:
+            router.end()
 
 
 class RmwNode(RosNode):

@@ -2,6 +2,7 @@
 SIGTERM; or with a configuration file in place of the endpoint. It is the same router as `zenohd`, in a
 session of eclipse-zenoh."""
 
+import os
 import signal
 import sys
 
@@ -9,6 +10,7 @@ import zenoh
 
 
 def main(place: str) -> None:
+    os.environ.pop("ZENOH_RUNTIME", None)  # the panel's own, which its tests have inherited
     config = zenoh.Config.from_file(place) if place.endswith(".json5") else with_defaults(place)
     with zenoh.open(config):
         print("router: running", file=sys.stderr, flush=True)
