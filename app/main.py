@@ -215,6 +215,7 @@ async def _app_state(
                 lambda: oplog.left_out,
                 lambda: limits.refused,
                 lambda: oplog.uncopied,
+                wall,
             )
             made = PageTemplates(shipped_path("templates"), page_parts(panel), shipped_path(COMPILED))
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)

@@ -20,6 +20,7 @@ import tempfile
 import threading
 import time
 import urllib.request
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -38,7 +39,7 @@ PANELS: Final = 2 if QUICK else 10
 ROBOTS_EACH: Final = 5
 TICKS: Final = os.sysconf("SC_CLK_TCK")
 PAGE_B: Final = os.sysconf("SC_PAGE_SIZE")
-TILE: Final = rb'class="wall-tile" data-row="\w+" data-is="%s"'
+TILE: Final = re.compile(rb'<a data-row="c\w+"(?: data-is="(\w+)")?')
 ZENOH: Final = (ROOT / "zenoh.json5").read_text()
 
 
@@ -92,6 +93,11 @@ def page(url: str, **headers: str) -> bytes:
     request = urllib.request.Request(url, headers={"accept": "text/html", **headers})
     with urllib.request.urlopen(request, timeout=10) as answer:
         return bytes(answer.read())
+
+
+def kinds(html: bytes) -> Counter[str]:
+    """How many tiles of each kind the page of a wall has."""
+    return Counter(kind.decode() or "running" for kind in TILE.findall(html))
 
 
 def ready(url: str) -> bool:
@@ -178,7 +184,7 @@ def _wall_of(count: int) -> None:
         stack.callback(saying.join)
         stack.callback(ended.set)
         until(lambda: ready(url), "the wall is ready")
-        until(lambda: page(url).count(b'data-is="running"') >= count, "all cells are there")
+        until(lambda: kinds(page(url))["running"] >= count, "all cells are there")
         alone = cores(server)
         with watched(url) as received:
             time.sleep(2)
@@ -308,15 +314,14 @@ def measure_plant() -> None:
             servers.append(server(panel, folder, 8100 + number, cells.enter))
             stack.callback(servers[-1].end)
 
-        def counts() -> dict[str, int]:
+        def counts() -> Counter[str]:
             with suppress(OSError), hall.inside():
                 html = page("http://127.0.0.1:8000")
-                kinds = ("running", "unknown", "lost")
-                return {kind: len(re.findall(TILE % kind.encode(), html)) for kind in kinds}
-            return {}
+                return kinds(html)
+            return Counter()
 
         def shown(kind: str) -> bool:
-            return counts().get(kind) == PANELS
+            return counts()[kind] == PANELS
 
         print(f"  all cells are seen after {until(lambda: shown('running'), 'all run'):.1f} s")
         each = sum(cores(each, 1.0 if QUICK else 3.0) for each in servers) / PANELS
@@ -324,7 +329,7 @@ def measure_plant() -> None:
         print(f"  the wall {cores(watching):.1%}, the routers", *(f"{cores(w, 3.0):.1%}" for w in ways))
         cable.impair(delay_s=0.05, loss=0.02)
         time.sleep(MEASURED_S)
-        print(f"  with 50 ms and 2 % loss each way: {counts()}")
+        print(f"  with 50 ms and 2 % loss each way: {dict(counts())}")
         cable.impair()
         cable.cut()
         print(f"  the cable is cut: no contact after {until(lambda: shown('lost'), 'lost'):.1f} s")
@@ -335,7 +340,7 @@ def measure_plant() -> None:
         took = until(lambda: shown("running"), "they have changed over")
         print(f"  a router is killed: all run after {took + 0.2:.1f} s")
         time.sleep(MEASURED_S)
-        print(f"  {MEASURED_S:g} s later: {counts()}", flush=True)
+        print(f"  {MEASURED_S:g} s later: {dict(counts())}", flush=True)
 
 
 PHASES: Final = {"wall": measure_wall, "plant": measure_plant, "robots": measure_robots}

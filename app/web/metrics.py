@@ -5,11 +5,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from app.cell.robot.traffic import RoundTrips, RoundTripSummary
 from app.cell.session.fleet import Fleet
 from app.system.limits import BoundedDict
+
+if TYPE_CHECKING:
+    from app.cell.site.wall import Wall
 
 
 @dataclass(slots=True)
@@ -44,14 +47,16 @@ class Metrics:
         left_out: Callable[[], int] = lambda: 0,
         limited: Callable[[], int] = lambda: 0,
         uncopied: Callable[[], Mapping[str, int]] = dict,
+        wall: "Wall | None" = None,
     ) -> None:
-        """Reports the links and topics of the fleet's robots. `left_out` is how many refusals the
-        operator's log only counts, `limited` how many presses, holds and cancels were more than their
-        limit, `uncopied` how many of its entries each copy of it lacks."""
+        """Reports the links and topics of the fleet's robots, or the cells of a wall. `left_out` is how
+        many refusals the operator's log only counts, `limited` how many presses, holds and cancels were
+        more than their limit, `uncopied` how many of its entries each copy of it lacks."""
         self.fleet = fleet
         self.left_out = left_out
         self.limited = limited
         self.uncopied = uncopied
+        self.wall = wall
         self.presses: dict[str, Count] = {}  # by outcome
         self.streams = Open()
 

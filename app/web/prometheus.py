@@ -21,10 +21,11 @@ from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.alarms import Alarms
 from app.cell.session.fleet import Fleet
 from app.cell.view.machine_status import Machine
+from app.web.metrics import Metrics
 
 if TYPE_CHECKING:
     from app.cell.forward.status import ForwardStatus
-from app.web.metrics import Metrics
+    from app.cell.site.wall import Wall
 
 
 def exposition(metrics: Metrics) -> tuple[bytes, str]:
@@ -63,6 +64,33 @@ class _Of(Collector):
                 yield from _of_mqtt(metrics.fleet.alarms.mqtt)
             if metrics.fleet.forward is not None:
                 yield from _of_forward(metrics.fleet.forward.status)
+        if metrics.wall is not None:
+            yield from _of_wall(metrics.wall)
+
+
+def _of_wall(wall: "Wall") -> Iterator[Metric]:
+    """Of all cells together, so that a thousand cells are as many lines as one."""
+    from app.cell.site.cells import TILE_KINDS
+
+    about = "1 while the wall is connected to a router"
+    yield GaugeMetricFamily("kiosk_wall_connected", about, value=wall.is_connected)
+    cells = GaugeMetricFamily("kiosk_wall_cells", "Cells by state", labels=["state"])
+    counts = wall.table.counts()
+    for kind in TILE_KINDS:
+        cells.add_metric([kind], counts[kind])
+    yield cells
+    alarms = GaugeMetricFamily(
+        "kiosk_wall_alarms", "Alarms of the cells", labels=["priority", "acknowledged"]
+    )
+    for priority, (acknowledged, unacknowledged) in wall.table.alarms_by_priority.items():
+        alarms.add_metric([priority, "yes"], acknowledged)
+        alarms.add_metric([priority, "no"], unacknowledged)
+    yield alarms
+    about = "The age of the oldest summary of a cell that has contact"
+    oldest = wall.table.oldest_s(time.monotonic())
+    yield GaugeMetricFamily("kiosk_wall_oldest_seconds", about, value=oldest)
+    about = "Cells that found no room on the wall, or have a name that is none"
+    yield CounterMetricFamily("kiosk_wall_left_out", about, value=wall.table.left_out)
 
 
 def _of_alarms(alarms: Alarms) -> Iterator[Metric]:

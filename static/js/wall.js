@@ -28,7 +28,7 @@ const observer = new IntersectionObserver((entries) => {
 function observe() {
   observer.disconnect();
   seen.clear();
-  const tiles = main.querySelectorAll("a.wall-tile");
+  const tiles = main.querySelectorAll(".wall-tiles > a");
   for (const tile of tiles) observer.observe(tile);
   if (!tiles.length) follow();
 }
@@ -60,9 +60,10 @@ function show({ tiles = {}, parts = {}, ages = {}, order }) {
   for (const [id, html] of Object.entries(parts)) put(document.getElementById(id), html);
   // What was drawn again has no age, or an old one.
   for (const [id, age] of Object.entries(ages)) known.set(id, age);
-  for (const element of main.querySelectorAll("[data-age]")) {
-    const age = known.get(element.dataset.age ?? "");
-    if (age !== undefined && element.textContent !== age) element.textContent = age;
+  for (const row of main.querySelectorAll("[data-row]")) {
+    const age = known.get(row.getAttribute("data-row") ?? "");
+    const element = age === undefined ? null : row.querySelector(":scope > i, .age");
+    if (element && element.textContent !== age) element.textContent = age ?? "";
   }
   if (order !== undefined && String(order) !== main.dataset.order) redrawLater();
 }

@@ -15,9 +15,9 @@ from tests.support.cells import Cells, alarm, client_of
 from tests.support.parts import ROOT, Server, until
 from tests.support.rmw import Router
 
-TILE: Final = re.compile(
-    r'<a class="wall-tile" data-row="(c[0-9a-f]{10})" data-is="(\w+)"(.*?)</a>', re.DOTALL
-)
+TILE: Final = re.compile(r'<a data-row="(c[0-9a-f]{10})"(?: data-is="(\w+)")?(.*?)</a>', re.DOTALL)
+
+BYTES_OF_TILE: Final = 165
 
 
 def wall_server(folder: Path, router: Router, sites: str = "*", **more: Any) -> Server:
@@ -56,7 +56,10 @@ def page(server: Server, query: str = "", **headers: str) -> str:
 
 def tiles(html: str) -> dict[str, tuple[str, str]]:
     """The kind and the rest of each tile, by the cell's name."""
-    matches = {re.search("<b>(.*?)</b>", rest)[1]: (kind, rest) for _, kind, rest in TILE.findall(html)}  # type: ignore[index]
+    matches = {
+        re.search("<b>(.*?)</b>", rest)[1]: (kind or "running", rest)  # type: ignore[index]
+        for _, kind, rest in TILE.findall(html)
+    }
     return matches
 
 
@@ -168,6 +171,35 @@ def test_events_bring_what_has_changed_in_view(wall: Server, cells: Cells) -> No
     assert ids[70] not in first["tiles"]  # not in view
     assert set(first["ages"]) >= {ids[0]}
     assert wall.http.get("/wall/events?first=x").status_code == 422
+    sizes = [len(match[0]) for match in TILE.finditer(page(wall, "?site=viewed"))]
+    assert max(sizes) <= BYTES_OF_TILE, "1,000 cells are less than 200 kB"
+
+
+def test_metrics_count_cells_and_alarms_in_a_bounded_number_of_lines(
+    wall: Server, cells: Cells
+) -> None:
+    cells.put("metrics", "in fault", "fault", alarm_list=[alarm(1, "Door"), alarm(1, "Air")])
+    known = alarm(2, "Oil", acknowledged=True)
+    cells.put("metrics", "known", alarm_list=[known], unacknowledged=dict.fromkeys("1234", 0))
+
+    def gauges() -> dict[str, float]:
+        lines = wall.http.get("/metrics").text.splitlines()
+        rows = (line.rsplit(" ", 1) for line in lines if line.startswith("kiosk_wall"))
+        return {name: float(value) for name, value in rows}
+
+    def all_counted() -> dict[str, float] | None:
+        read = gauges()
+        is_there = read['kiosk_wall_alarms{acknowledged="yes",priority="2"}'] >= 1
+        return read if is_there and read['kiosk_wall_cells{state="fault"}'] >= 1 else None
+
+    counted = until(all_counted, "they are counted")
+    assert counted["kiosk_wall_connected"] == 1
+    assert counted['kiosk_wall_alarms{acknowledged="no",priority="1"}'] >= 2
+    assert 0 <= counted["kiosk_wall_oldest_seconds"] <= SILENT_S + 2
+    for number in range(50):
+        cells.put("metrics", f"m{number}")
+    until(lambda: gauges()['kiosk_wall_cells{state="running"}'] >= 50, "all are counted")
+    assert gauges().keys() == counted.keys()
 
 
 def test_nothing_of_a_robot_is_there(wall: Server) -> None:

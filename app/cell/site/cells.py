@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, get_args
 
-from app.cell.site.summary import EVERY_S, Kind, ReadAlarm, Summary, read_summary
+from app.cell.site.summary import EVERY_S, Kind, Priority, ReadAlarm, Summary, read_summary
 from app.panel.rules import CHUNK
 from app.ros.zenoh.site import CellChanges
 from app.system.errors import InputError
@@ -136,6 +136,24 @@ class CellTable:
             unacknowledged = sum(sum(summary.unacknowledged.values()) for summary in summaries)
             self._totals = AlarmTotals(of_all[:LISTED_ALARMS], standing, unacknowledged)
         return self._totals
+
+    @property
+    def alarms_by_priority(self) -> dict[str, tuple[int, int]]:
+        """Of all cells: the acknowledged and the unacknowledged alarms of each priority."""
+        standing, unacknowledged = Counter[str](), Counter[str]()
+        for cell in self._cells.values():
+            if cell.summary is not None:
+                standing.update(cell.summary.alarms)
+                unacknowledged.update(cell.summary.unacknowledged)
+        return {
+            priority: (max(0, standing[priority] - unacknowledged[priority]), unacknowledged[priority])
+            for priority in get_args(Priority)
+        }
+
+    def oldest_s(self, now: float) -> float:
+        """The age of the oldest summary of a cell that is reached, 0 without one."""
+        heard = [cell.heard_at or cell.came_at for cell in self._cells.values() if cell.lost_at is None]
+        return max(0.0, now - min(heard, default=now))
 
     @property
     def waiting(self) -> list[Names]:

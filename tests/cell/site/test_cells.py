@@ -199,3 +199,15 @@ def test_a_filter_lists_by_name_and_greys_out_by_state() -> None:
 @given(st.lists(st.text(max_size=12), max_size=6))
 def test_any_names_have_an_order(names: list[str]) -> None:
     assert sorted(sorted(names, key=natural), key=natural) == sorted(names, key=natural)
+
+
+def test_alarms_are_counted_by_priority_and_the_oldest_word_by_its_age() -> None:
+    stage = Stage()
+    assert stage.table.oldest_s(stage.now) == 0.0
+    stage.say("line 1", "one", alarm_list=[alarm(1, "a"), alarm(3, "b")])
+    stage.after(4.0)
+    stage.say("line 1", "two", alarm_list=[alarm(1, "c")], unacknowledged=dict.fromkeys("1234", 0))
+    assert stage.table.alarms_by_priority == {"1": (1, 1), "2": (0, 0), "3": (0, 1), "4": (0, 0)}
+    assert stage.table.oldest_s(stage.now + 1) == 5.0
+    stage.token("line 1", "one", alive=False)
+    assert stage.table.oldest_s(stage.now + 1) == 1.0, "of those that are reached"
