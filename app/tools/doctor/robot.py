@@ -309,6 +309,12 @@ class RobotLink:
         queries = neighbour_queries(*self.session.neighbours())
         return all(await asyncio.gather(*(self.session.query_all(q, ASK_S) for q in queries)))
 
+    def is_at_several(self, graph: GraphSnapshot) -> bool:
+        """Whether it is connected to a router, and to another router or a bridge at the same time."""
+        routers, peers = self.session.neighbours()
+        bridges = {bridge.zid for bridge in graph.bridges}
+        return len(routers | peers) > 1 and bool(routers - bridges)
+
 
 async def check_connection(
     report: Report,
@@ -377,7 +383,9 @@ async def _inspect(
     MapChecks(report, behind, received, interfaces).check()
     has_clock = any(behind.publishers(CLOCK))
     check_clocks(report, robot, received, interfaces, has_clock=has_clock)
-    if graph.bridges:
+    if link.is_at_several(graph):
+        report.find("peer_at_routers", ", ".join(endpoints), robot=robot.id)
+    elif graph.bridges:
         check_copies(report, robot, received)
     return graph
 

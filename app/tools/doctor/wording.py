@@ -67,6 +67,7 @@ WARNINGS: Final = (
     "bridge_version",
     "bridge_drops",
     "bridge_piled_readers",
+    "peer_at_routers",
     "robot_elsewhere",
     "clock_differs",
     "other_time",
