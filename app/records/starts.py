@@ -227,7 +227,7 @@ def read_start_files(
         files.setdefault(group, {})[name] = digest
         if group in FILE_GROUPS:
             contents[digest] = data
-    program = list_text(_program())
+    program = list_text(program_files())
     files["program"] = {"sha256sum": sha256(program)}
     contents[sha256(program)] = program
     texts = settings_text(settings, mode)
@@ -282,7 +282,7 @@ def _paths(settings: Settings, panel: "Panel") -> Iterator[tuple[str, str, Path]
     yield "zenoh", settings.zenoh.name, settings.zenoh
 
 
-def _program() -> Iterator[tuple[str, str]]:
+def program_files() -> Iterator[tuple[str, str]]:
     """Name and hash of each file of the program. Plain calls of the system: there are many files, and
     the server waits for them."""
     beside = (shipped_path("templates"), shipped_path("static"))  # in the package, unless a checkout

@@ -19,14 +19,15 @@ from fastapi.responses import FileResponse, Response
 from starlette.datastructures import MutableHeaders
 from starlette.types import Message, Receive, Scope, Send
 
-from app.system.errors import LogError
+from app.system.errors import KioskError
 from app.system.worker import RunningWorker
 
-# The response with an export as CSV, which another process makes.
+# The response with a file that another process makes, such as an export as CSV.
 
 log = logging.getLogger("kiosk.log")
 
 TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
+EXPORT_TYPES: Final = {".csv": "text/csv", ".zip": "application/zip"}
 START: Final = "http.response.start"
 BODY: Final = "http.response.body"
 
@@ -35,18 +36,23 @@ class Exported(Response):
     """The response with an export, sent piece by piece. An export that fails, or that no client reads,
     is not terminated: no client takes it for complete."""
 
-    media_type = "text/csv"
-
     def __init__(
-        self, export: RunningWorker, first: bytes, gzip: bool, opened: AsyncExitStack, name: str
+        self,
+        export: RunningWorker,
+        first: bytes,
+        encoding: Mapping[str, str],
+        opened: AsyncExitStack,
+        name: str,
+        suffix: str,
     ) -> None:
-        """`opened` is closed when it is over; `name` says what is exported: "operator's log"."""
+        """`encoding` are its headers; `opened` is closed when it is over; `name` says what is exported:
+        "operator's log"."""
         self._name = name
+        self.media_type = EXPORT_TYPES[suffix]
         begin = name.replace(" ", "-").replace("'", "")
-        name = f"{begin}-{datetime.now().strftime('%Y%m%d-%H%M%S')}.csv"
+        name = f"{begin}-{datetime.now().strftime('%Y%m%d-%H%M%S')}{suffix}"
         headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
-        if gzip:
-            headers |= {"content-encoding": "gzip", "vary": "accept-encoding"}
+        headers |= encoding
         self._export = export
         self._first = first
         self._opened = opened
@@ -61,7 +67,7 @@ class Exported(Response):
                 await self._send(send, going)
             except TimeoutError:
                 log.warning("an export of the %s was not taken for %g s", self._name, TAKEN_WITHIN_S)
-            except LogError as error:
+            except KioskError as error:
                 if not going.done():
                     log.warning("an export of the %s broke off: %s", self._name, error)
             going.cancel()
@@ -89,10 +95,25 @@ async def exported(
 ) -> Exported:
     """The response with an export, which gets whether it is compressed; LogError if it can't begin."""
     gzip = "gzip" in request.headers.get("accept-encoding", "")
+    encoding = {"content-encoding": "gzip", "vary": "accept-encoding"} if gzip else {}
+    return await _begun(export(gzip), encoding, name, ".csv")
+
+
+async def exported_zip(export: AbstractAsyncContextManager[RunningWorker], name: str) -> Exported:
+    """The response with a zip; the error of `export` if it can't begin."""
+    return await _begun(export, {"content-encoding": "identity"}, name, ".zip")
+
+
+async def _begun(
+    export: AbstractAsyncContextManager[RunningWorker],
+    encoding: Mapping[str, str],
+    name: str,
+    suffix: str,
+) -> Exported:
     async with AsyncExitStack() as opened:
-        running = await opened.enter_async_context(export(gzip))
+        running = await opened.enter_async_context(export)
         first = await running.next_result()
-        return Exported(running, first, gzip, opened.pop_all(), name)
+        return Exported(running, first, encoding, opened.pop_all(), name, suffix)
 
 
 async def _send_in_time(send: Send, message: Message) -> None:

@@ -78,6 +78,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/stops/{key}": OPERATOR,
     "/stops/asked": OPERATOR,
     "/stops/{key}/story.json": OPERATOR,
+    "/stops/{key}/parcel.zip": MAINTENANCE,
     "/oee": OPERATOR,
     "/oee/figures": OPERATOR,
     "/oee/stops.csv": OPERATOR,

@@ -305,7 +305,7 @@ def test_an_export_that_no_client_reads_is_given_up(
         async with AsyncExitStack() as stack:
             export = await stack.enter_async_context(log.export(Filter(every=True), None, False))
             answer = downloads.Exported(
-                export, await export.next_result(), False, stack.pop_all(), "operator's log"
+                export, await export.next_result(), {}, stack.pop_all(), "operator's log", ".csv"
             )
         await answer({"type": "http"}, never, send)
         assert [message.get("more_body") for message in sent] == [None, True, True]

@@ -331,8 +331,12 @@ def test_all_acts_are_here() -> None:
         "places": PLACE_ACTS,
     }
     assert {(room, act) for room, acts in tables.items() for act in acts} <= named
-    # Those on stops are sent in tests/web/test_oee.py, as this cell has no stop.
-    assert ([*SHIFT_ACTS], ("alarms", "report") in named) == (["message", "reason", "later"], True)
+    # Those on stops are sent in tests/web/test_oee.py, and that of a parcel in
+    # tests/tools/doctor/test_parcel.py, as this cell has no stop.
+    assert ([*SHIFT_ACTS], ("alarms", "report") in named) == (
+        ["message", "reason", "parcel", "later"],
+        True,
+    )
 
 
 def test_every_act_is_the_same_by_json_and_by_form(

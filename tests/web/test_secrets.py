@@ -1,16 +1,19 @@
-"""Secrets that are entered everywhere are in no answer, log, recording, support bundle or file."""
+"""Secrets that are entered everywhere are in no answer, log, recording, support bundle, fault parcel or
+file."""
 
 import gzip
 import io
 import secrets as random_secrets
 import zipfile
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 
 import httpx
 import pytest
 from mcap.reader import make_reader
 
+from app.tools.cli.command import main
 from tests.support.confirmed import PANEL
 from tests.support.parts import until
 from tests.support.servers import demo_server
@@ -120,6 +123,20 @@ def test_no_secret_is_anywhere(browsers: Browsers, tmp_path: Path) -> None:
         assert session
         output = server.process.text
         shown.append(output)
+    parcel = tmp_path / "fault.zip"
+    at = datetime.now().isoformat()
+    command = [
+        "parcel",
+        str(tmp_path / "cell.toml"),
+        "--data",
+        str(data),
+        "--at",
+        at,
+        "-o",
+        str(parcel),
+    ]
+    assert main([*command, "--port", str(server.port)]) == 0
+    shown.append(unpacked(parcel.read_bytes()).decode("latin-1"))
     kept = b"".join(unpacked(path.read_bytes()) for path in data.rglob("*.mcap"))
     assert b"Confirmed by M. Sato and K. Novak" in kept
     for secret in secrets:

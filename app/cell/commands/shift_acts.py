@@ -1,4 +1,5 @@
-"""Acts of a shift: the rows of a message to the next shift, of the reason of a stop, and of "later".
+"""Acts of a shift: the rows of a message to the next shift, of the reason of a stop, of "later", and of
+a fault parcel.
 
 `ActRequest.values` has the `text` of a message; of a stop its key `stop`, when it `began` (RFC 3339)
 and the id of its `reason`. `object` is then the key of the stop. All of it is only in the operator's
@@ -11,6 +12,7 @@ from datetime import datetime
 from typing import Any, Final
 
 from app.cell.commands.acts import Act, ActRequest, Applied, server_permits
+from app.panel.roles import MAINTENANCE
 from app.panel.rules import OeeRules
 from app.system.clock import format_time
 from app.system.texts import Text, TextLike, say
@@ -47,6 +49,11 @@ def _postpone(_: OeeRules | None, request: ActRequest) -> StopAct:
     return StopAct(began=_began(request))
 
 
+def _take(_: OeeRules | None, request: ActRequest) -> StopAct:
+    """The caller makes the parcel once the act is logged."""
+    return StopAct(began=_began(request))
+
+
 def _began(request: ActRequest) -> TextLike:
     return format_time(datetime.fromisoformat(str(request.values["began"])).timestamp())
 
@@ -63,6 +70,13 @@ def needs_of_reason(rules: OeeRules | None, stop: str) -> tuple[str, ...]:
 SHIFT_ACTS: Final[Mapping[str, Act[OeeRules | None, Any]]] = {
     "message": Act("log_page_alarm_message", server_permits, _leave, lambda _: say("log_done_message")),
     "reason": Act("log_page_stop_reason", server_permits, _answer, _answered),
+    "parcel": Act(
+        "log_page_stop_parcel",
+        server_permits,
+        _take,
+        lambda act: say("log_done_stop_parcel", time=act.began),
+        MAINTENANCE,
+    ),
     "later": Act(
         "log_page_stop_later",
         server_permits,

@@ -1,4 +1,5 @@
-"""The work of `operator-panel doctor` and `support` for the page of diagnostics, one at a time.
+"""The work of `operator-panel doctor` and `support` for the page of diagnostics, one at a time, and of
+`parcel` for the page of a stop, one at a time.
 
 Each is done in a process: its checks take some seconds of CPU, which no press waits for, and it has a
 Zenoh session to itself. So the page has what the commands have, by the same rules.
@@ -7,22 +8,25 @@ Zenoh session to itself. So the page has what the commands have, by the same rul
 import asyncio
 import logging
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, Field, ValidationError
 
 from app.system.concurrency import spawn_logged
-from app.system.errors import DoctorError
+from app.system.errors import DoctorError, TooMany
 from app.system.settings import Settings
 from app.system.texts import TextLike, say
-from app.system.worker import Limits, Worker, Workers
+from app.system.worker import Limits, RunningWorker, Worker, Workers
 
 log = logging.getLogger("kiosk.doctor")
 
 LIMITS: Final = Limits(within_s=120.0)
 MOST_BYTES: Final = 64_000_000  # of a bundle
 LONGEST_REASON: Final = 300  # characters
+AGAIN_S: Final = 10
 
 
 class FoundFault(BaseModel):
@@ -55,6 +59,12 @@ def _failed(why: TextLike) -> DoctorError:
     return DoctorError(say("doctor_failed", why=cut or "its process ended"))
 
 
+def _not_made(why: TextLike) -> DoctorError:
+    log.warning("a fault parcel was not made: %s", why)
+    cut = why[:LONGEST_REASON] if isinstance(why, str) else why
+    return DoctorError(say("parcel_failed", why=cut or "its process ended"))
+
+
 @dataclass(slots=True)
 class DoctorProcess:
     """The doctor of one server, which listens on `host` and `port`. Used on the event loop only.
@@ -69,6 +79,8 @@ class DoctorProcess:
     fault: TextLike = ""
     _lock: asyncio.Lock = field(default_factory=asyncio.Lock)
     _workers: Workers = field(default_factory=lambda: Workers(_failed))
+    _parcel_lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+    _parcels: Workers = field(default_factory=lambda: Workers(_not_made))
     _checking: "asyncio.Task[None] | None" = None
 
     @property
@@ -88,9 +100,25 @@ class DoctorProcess:
             raise _failed("the bundle is too large")
         return bundle
 
+    @asynccontextmanager
+    async def parcel(
+        self, at: float, key: str, robot: str, language: str
+    ) -> AsyncIterator[RunningWorker]:
+        """The fault parcel of a stop at a time (seconds since the epoch), in pieces of its zip;
+        DoctorError if it can't be made, TooMany while another one is."""
+        if self._parcel_lock.locked():
+            raise TooMany(say("parcel_busy"), AGAIN_S)
+        async with self._parcel_lock:
+            where = (self.settings, self.host, self.port)
+            name = "app.tools.cli.parcel:pieces"
+            worker = Worker(name, *where, at, key, robot, language, limits=LIMITS)
+            async with self._parcels.run(worker) as running:
+                yield running
+
     async def stop(self) -> None:
         """Ends the process that runs."""
         self._workers.close()
+        self._parcels.close()
         if self._checking is not None:
             await asyncio.gather(self._checking, return_exceptions=True)
 

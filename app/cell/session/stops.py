@@ -1,17 +1,17 @@
-"""Reads stops and their stories from the stores of a running server, when they are asked for."""
+"""Reads stops and their stories from the stores of a panel, when they are asked for."""
 
 import asyncio
-from collections.abc import Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from app.cell.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow, history_rows, reading
 from app.cell.alarms.report import CountRow, read_counts, read_states
 from app.cell.alarms.shown import AskedReason
 from app.cell.commands.shift_acts import REASON_ACTION
 from app.cell.session.fleet import Fleet
-from app.cell.session.session import RobotSession
 from app.cell.stops.changes import Change, ChangeFilter, read_changes
 from app.cell.stops.oee import (
     Answer,
@@ -45,6 +45,7 @@ from app.cell.stops.sources import (
 )
 from app.cell.stops.story import AFTER_S, BEFORE_S, MOST_EVENTS, Event, Stop, StopSort, Story, story_of
 from app.cell.view.times import duration_text
+from app.panel.model import Panel
 from app.records import Filter, LogRow, NullLog, OperatorLog
 from app.system.clock import format_time
 from app.system.errors import NotFound
@@ -58,24 +59,57 @@ LATE_S: Final = 5.0  # by so much the arrival of a stamped change may be later t
 FORWARD_S: Final = 86_400.0  # in which the end of a stop is looked for
 
 
+class LogRows(Protocol):
+    """The entries of an operator's log."""
+
+    async def rows(self, wanted: Filter, before: int | None, count: int) -> Sequence[LogRow]:
+        """The newest `count` that match, before the entry number `before`. LogError, TooMany."""
+
+
+class AlarmRows(Protocol):
+    """The history of alarms."""
+
+    async def read(self, read: Callable[[Path | None], list[HistoryRow]]) -> list[HistoryRow]:
+        """What a function reads from its file, None for none. LogError, TooMany."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopStores:
+    """Where the stops of a panel are read from. `names` is what its robots call their parts, `robots`
+    the name of each in the operator's log, both by the robot's id, "" for the only one. `log` is None
+    without a log, `states` without a journal of changes."""
+
+    panel: Panel
+    names: Mapping[str, PanelNames]
+    robots: Mapping[str, str]
+    alarms: AlarmRows
+    log: LogRows | None
+    states: Path | None
+
+
+def stores_of(fleet: Fleet, log: OperatorLog | NullLog) -> StopStores:
+    """Those of a running server."""
+    sessions = {session.entry.id if session.entry else "": session for session in fleet.sessions}
+    return StopStores(
+        panel=fleet.panel,
+        names={robot: PanelNames(session.panel) for robot, session in sessions.items()},
+        robots={robot: session.robot.name for robot, session in sessions.items()},
+        alarms=fleet.alarms.history,
+        log=log if isinstance(log, OperatorLog) else None,
+        states=fleet.states,
+    )
+
+
 class StopReader:
-    """The stops of all robots of a fleet. Used on the event loop only; it reads beside it."""
+    """The stops of all robots of a panel. Used on an event loop only; it reads beside it."""
 
-    def __init__(self, fleet: Fleet, log: OperatorLog | NullLog) -> None:
-        self._fleet = fleet
-        self._log = log
-
-    @cached_property
-    def _names(self) -> dict[str, PanelNames]:
-        sessions = self._fleet.sessions
-        return {self._id(session): PanelNames(session.panel) for session in sessions}
-
-    def _id(self, session: RobotSession) -> str:
-        return session.entry.id if session.entry else ""
+    def __init__(self, stores: StopStores) -> None:
+        self._stores = stores
 
     def names(self, robot: str) -> PanelNames:
         """What the panel of a robot calls its parts; of the first for one that is no longer there."""
-        return self._names.get(robot) or next(iter(self._names.values()))
+        names = self._stores.names
+        return names.get(robot) or next(iter(names.values()))
 
     async def stops(self, since: float, until: float, robot: str | None = None) -> list[Stop]:
         """The newest stops from `since` on and before `until` (seconds since the epoch), the newest
@@ -88,10 +122,10 @@ class StopReader:
             known += alarm_stops(await self._alarms(asked, MAX_PAGE))
         aborted = Filter(since=round(since * 1000), until=round(until * 1000), outcome="aborted")
         rows = await self._entries(aborted, MOST_STOPS)
-        for session in self._fleet.sessions:
-            if robot in (None, self._id(session)):
-                own = [row for row in rows if row.entry.robot == session.robot.name]
-                known += goal_stops(self.names(self._id(session)), self._id(session), own)
+        for own, name in self._stores.robots.items():
+            if robot in (None, own):
+                goals = [row for row in rows if row.entry.robot == name]
+                known += goal_stops(self.names(own), own, goals)
         return separate(known)[:MOST_STOPS]
 
     async def latest(self, now: float, robot: str | None = None) -> Stop | None:
@@ -132,13 +166,14 @@ class StopReader:
         entries = await self._entries(
             Filter(since=round(since * 1000), until=round(until * 1000)), MOST_EVENTS
         )
-        robot = self._fleet.of_robot(stop.robot).robot.name
+        robots = self._stores.robots
+        robot = robots.get(stop.robot, next(iter(robots.values())))
         events: list[Event] = [
             *change_events(names, changes),
             *alarm_events(names, [row for row in reversed(alarms) if row.robot in ("", stop.robot)]),
             *log_events(names, [row for row in reversed(entries) if row.entry.robot in ("", robot)]),
         ]
-        rules = self._fleet.panel.state
+        rules = self._stores.panel.state
         return story_of(
             stop,
             events,
@@ -160,7 +195,7 @@ class StopReader:
     ) -> tuple[list[Spell], list[AnsweredStop]]:
         """The states of a robot from some days before a time on, and when it stood still in the time,
         with the reasons that were given. Errors as of `stops`."""
-        panel, path = self._fleet.panel, self._fleet.states
+        panel, path = self._stores.panel, self._stores.states
         if panel.oee is None or panel.state is None or path is None:
             return [], []
         running = panel.oee.running_values(panel.state)
@@ -184,9 +219,9 @@ class StopReader:
 
     async def counts(self, robot: str, since: float, until: float) -> list[CountRow]:
         """What its counters showed."""
-        if self._fleet.states is None:
+        if self._stores.states is None:
             return []
-        return await asyncio.to_thread(read_counts, self._fleet.states, robot, since, until)
+        return await asyncio.to_thread(read_counts, self._stores.states, robot, since, until)
 
     async def _answers(self, since: float) -> list[Answer]:
         """The newest first."""
@@ -197,33 +232,30 @@ class StopReader:
     async def _stop(self, sort: StopSort, number: int) -> Stop | None:
         if sort in ("state", "link"):
             rows = await self._changes(ChangeFilter(seq=number), 1)
-            counts = self._fleet.panel.oee is not None
+            counts = self._stores.panel.oee is not None
             stops = change_stops(self.names, (row for row in rows if row.sort == sort), counts)
             return next(stops, None)
         if sort == "alarm":
             asked = await self._alarms(HistoryFilter(before=number + 1), 1)
             return next((self._as_stop(row) for row in asked if row.seq == number), None)
         for row in await self._entries(Filter(outcome="aborted"), 1, before=number + 1):
-            for session in self._fleet.sessions:
-                if row.entry.seq == number and row.entry.robot == session.robot.name:
-                    robot = self._id(session)
+            for robot, name in self._stores.robots.items():
+                if row.entry.seq == number and row.entry.robot == name:
                     return next(goal_stops(self.names(robot), robot, [row]), None)
         return None
 
     async def _changes(self, wanted: ChangeFilter, most: int) -> list[Change]:
-        if self._fleet.states is None:
+        if self._stores.states is None:
             return []
-        return await asyncio.to_thread(read_changes, self._fleet.states, wanted, most)
+        return await asyncio.to_thread(read_changes, self._stores.states, wanted, most)
 
     async def _alarms(self, wanted: HistoryFilter, most: int) -> list[HistoryRow]:
         """The newest first."""
-        return await self._fleet.alarms.history.read(partial(_read_alarms, wanted=wanted, most=most))
+        return await self._stores.alarms.read(partial(read_alarms, wanted=wanted, most=most))
 
     async def _entries(self, wanted: Filter, most: int, before: int | None = None) -> Sequence[LogRow]:
         """The newest first; none without a log."""
-        if not isinstance(self._log, OperatorLog):
-            return []
-        return await self._log.rows(wanted, before, most)
+        return [] if self._stores.log is None else await self._stores.log.rows(wanted, before, most)
 
 
 def _stood(
@@ -250,7 +282,7 @@ async def figures_of(
 ) -> ShiftFigures:
     """The figures of a robot ("" for the first) from `since` on and before `until`, in seconds since
     the epoch. LogError if the stores can't be read, TooMany if too many searches run."""
-    reader, span = StopReader(fleet, log), Span(since, until)
+    reader, span = StopReader(stores_of(fleet, log)), Span(since, until)
     entry = fleet.of_robot(robot).entry
     name = entry.id if entry else ""
     recorded, stops = await reader.standstills(name, since, until)
@@ -269,7 +301,7 @@ async def figures_of(
     return shift_figures(span, recorded, stops, quantity, plan)
 
 
-def _read_alarms(path: Path | None, wanted: HistoryFilter, most: int) -> list[HistoryRow]:
+def read_alarms(path: Path | None, wanted: HistoryFilter, most: int) -> list[HistoryRow]:
     """The newest `most` transitions of a filter, page by page."""
     rows: list[HistoryRow] = []
     with reading(path) as db:

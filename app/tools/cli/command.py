@@ -60,6 +60,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "scaffold": Command("write a first panel that fits a running robot", "robot.scaffold"),
     "doctor": Command("find out what is wrong between a panel, this machine and the robot", "doctor"),
     "support": Command("collect what support needs to know in a zip file", "support"),
+    "parcel": Command("collect what is known of a stop in a zip file for the vendor", "parcel"),
     "manual": Command("write the printable manual of a panel", "manual"),
     "sbom": Command("list what is installed, and check it against a VEX file", "sbom"),
     "backup": Command("write the data and the panel file of a panel to a zip file", "backup"),

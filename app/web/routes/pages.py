@@ -59,6 +59,7 @@ OTHER_PAGES = (
     "_look.html",
     "wall.html",
     "manual.html",
+    "stop-paper.html",
     "proof.html",
 )
 

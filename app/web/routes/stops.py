@@ -1,5 +1,6 @@
 """Why the machine stopped: the list of stops, and the story of each as a page and as JSON."""
 
+import secrets
 import time
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -11,15 +12,17 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.cell.alarms.shown import panel_id
+from app.cell.commands.acts import ActRequest
 from app.cell.commands.press import PRESS_ID
-from app.cell.session.stops import StopReader
+from app.cell.session.stops import StopReader, stores_of
 from app.cell.stops.oee import SAME_S
 from app.cell.stops.sources import PanelNames
 from app.cell.stops.story import MOST_EVENTS, Event, Line, Stop, StopSort, Story
 from app.cell.view.times import duration_text
+from app.panel.roles import MAINTENANCE
 from app.panel.rules import OeeReason
 from app.system.clock import format_datetime, format_time, iso_time
-from app.system.errors import NotFound
+from app.system.errors import LogError, NotFound
 from app.system.printable import printable
 from app.system.texts import Text, TextLike, joined, localized, number, render, say
 from app.system.texts.locales import MINUS
@@ -27,6 +30,7 @@ from app.web.acts import ActBody, act_responses, said_of, sent_act
 from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
+from app.web.downloads import exported_zip
 from app.web.pages.alarms import word as alarm_word
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import day_name, who_of
@@ -144,6 +148,7 @@ class StoryContext(TypedDict):
     left_out: TextLike
     to_do: ToDo
     asked: AskedStop | None
+    parcel: bool
     alarm_word: Any
     log_word: Any
     word: Any
@@ -230,7 +235,7 @@ async def asked(state: CurrentState) -> Response:
 async def give_reason(request: Request, state: CurrentState, key: Key) -> Response:
     sent = await sent_act(request, state, ReasonBody, REASON_FORM)
     reader = _reader(state)
-    stop = await reader.stop(*_sort_and_number(key))
+    stop = await reader.stop(*sort_and_number(key))
     stood = await reader.standstill_at(stop)
     if stood is None or not stood.key:
         raise NotFound(word_of_figures("no_stop"))
@@ -258,13 +263,14 @@ async def story_page(
     request: Request, state: CurrentState, key: Key, query: Annotated[StoryQuery, Query()]
 ) -> Response:
     reader = _reader(state)
-    story = await reader.story(*_sort_and_number(key))
+    story = await reader.story(*sort_and_number(key))
     end = await reader.end_of(story.stop)
     names = reader.names(story.stop.robot)
     page = FramedPage("stop.html", word("title"), f"/stops/{key}", "alarms")
     language = caller_of(request).language
     asked = await _asked(state, reader, story.stop, query.act)
     context = story_context(story, end, names, bool(query.all), language, asked)
+    context["parcel"] = caller_of(request).principal.meets(MAINTENANCE)
     return framed_page(request, state, page, context)
 
 
@@ -275,14 +281,36 @@ async def story_page(
 )
 async def story_json(request: Request, state: CurrentState, key: Key) -> JSONResponse:
     reader = _reader(state)
-    story = await reader.story(*_sort_and_number(key))
+    story = await reader.story(*sort_and_number(key))
     end = await reader.end_of(story.stop)
     answer = story_answer(story, end, caller_of(request).language)
     return JSONResponse(answer, headers={"cache-control": "no-store"})
 
 
+@router.get(
+    "/stops/{key}/parcel.zip",
+    response_class=Response,
+    summary="What is known of a stop, as a zip for the vendor's service desk",
+    responses=errors(403, 404, 422, 429, 503)
+    | {200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}}},
+)
+async def parcel(request: Request, state: CurrentState, key: Key) -> Response:
+    """Each one is an entry of the operator's log."""
+    stop = await _reader(state).stop(*sort_and_number(key))
+    caller = caller_of(request)
+    who, token = caller.identified()
+    asked = ActRequest("parcel", who, values={"stop": stop.key, "began": iso_time(stop.at)})
+    acts = state.fleet.of_robot(stop.robot).shift_acts
+    with state.in_flight.track():
+        receipt = await acts.act(asked, secrets.token_hex(8))
+    if not receipt.done:
+        raise LogError(receipt.reason)
+    made = state.doctor.parcel(stop.at, stop.key, stop.robot, caller.language)
+    return caller.with_client_cookie(await exported_zip(made, "fault"), token)
+
+
 def _reader(state: AppState) -> StopReader:
-    return StopReader(state.fleet, state.log)
+    return StopReader(stores_of(state.fleet, state.log))
 
 
 async def _asked(state: AppState, reader: StopReader, stop: Stop, act: str) -> AskedStop | None:
@@ -308,7 +336,8 @@ def _to(state: AppState, stop: Stop | None) -> Response:
     return RedirectResponse(f"{state.root}{path}", status_code=303)
 
 
-def _sort_and_number(key: str) -> tuple[StopSort, int]:
+def sort_and_number(key: str) -> tuple[StopSort, int]:
+    """Of a key in addresses."""
     sort, _, written = key.partition("-")
     return next(each for each in STOP_SORTS if each == sort), int(written)  # the pattern has them
 
@@ -334,7 +363,8 @@ def story_context(
     language: str,
     asked: AskedStop | None = None,
 ) -> StoryContext:
-    """The page of a story; `end` is when the stop was over, None while it is not known to be."""
+    """The variables of a story, for its page and for paper; `end` is when the stop was over, None while
+    it is not known to be."""
     short = story.short()
     lines = story.lines if is_whole else short
     count, every = number(str(len(short))), number(f"{len(story.lines):,d}")
@@ -351,6 +381,7 @@ def story_context(
         left_out="" if story.is_complete else word("left_out", count=number(f"{MOST_EVENTS:,d}")),
         to_do=to_do(story, names, language),
         asked=asked,
+        parcel=False,
         alarm_word=alarm_word,
         log_word=log_word,
         word=word,

@@ -1,0 +1,78 @@
+"""The recordings of a folder that cover a time: found by their names, read by their summaries. A file
+that can't be read is left out."""
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from datetime import UTC, datetime
+from itertools import islice
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from mcap.reader import make_reader
+
+from app.cell.history.recording import SUFFIX, UNFINISHED
+
+NAME: Final = r"[0-9]{8}T[0-9]{6}\.[0-9]{3}Z(?:-[A-Za-z0-9_.-]{1,200})?"
+LONGEST_BEFORE_S: Final = 600.0  # a file begins so long before the time in its name, at most
+MOST_READ: Final = 20  # files whose summaries are read
+
+
+class KeptRecording(NamedTuple):
+    """A finished file, with the times of its first and its last message (seconds since the epoch) and
+    its size in bytes."""
+
+    name: str
+    since: float
+    until: float
+    size: int
+
+
+def recordings_of(folder: Path, robot: str, since: float, until: float) -> list[KeptRecording]:
+    """The recordings of a robot ("" for the only one) that have messages between two times, the one
+    with the latest beginning first; none without a folder."""
+    candidates = (file for file in _newest_first(folder) if _may_cover(file, robot, since, until))
+    kept = (_read(file) for file in islice(candidates, MOST_READ))
+    return [each for each in kept if each and each.since <= until and each.until >= since]
+
+
+def has_unfinished(folder: Path, robot: str) -> bool:
+    """Whether a recording of a robot is being written."""
+    with suppress(OSError):
+        return any(_is_of(file, robot) for file in folder.glob(f"*{UNFINISHED}"))
+    return False
+
+
+def _newest_first(folder: Path) -> Iterator[Path]:
+    with suppress(OSError):
+        yield from sorted(folder.glob(f"*{SUFFIX}"), key=lambda file: file.name, reverse=True)
+
+
+def _is_of(file: Path, robot: str) -> bool:
+    name = file.name.split(".mcap")[0]
+    rest = name.partition("-")[2]
+    return re.fullmatch(NAME, name) is not None and (
+        not robot or rest == robot or rest.startswith(f"{robot}-")
+    )
+
+
+def _may_cover(file: Path, robot: str, since: float, until: float) -> bool:
+    if not _is_of(file, robot) or file.is_symlink():
+        return False
+    with suppress(OSError, ValueError):
+        begun = datetime.strptime(file.name[:19], "%Y%m%dT%H%M%S.%f").replace(tzinfo=UTC).timestamp()
+        return begun - LONGEST_BEFORE_S <= until and file.stat().st_mtime >= since
+    return False
+
+
+def _read(file: Path) -> KeptRecording | None:
+    """None for a file without messages, and for one that can't be read, whatever is in it."""
+    with suppress(Exception), file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        about = summary.statistics if summary else None
+        if about is not None and about.message_count:
+            times = about.message_start_time / 1e9, about.message_end_time / 1e9
+            if all(map(math.isfinite, times)):
+                return KeptRecording(file.name, *times, file.stat().st_size)
+    return None

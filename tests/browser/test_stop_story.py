@@ -1,0 +1,56 @@
+"""The page of a stop in the browser: its keys, and that it fits each screen in each language."""
+
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_accessibility import violations
+from tests.browser.test_alarm_line import SIZES
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
+from tests.web.test_stops import PANEL, keys
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with demo_server(tmp_path_factory.mktemp("cell"), PANEL) as server:
+        until(lambda: keys(server), "the machine has stopped", within_s=40)
+        yield server
+
+
+def test_the_fault_parcel_is_downloaded(cell: Server, page: Page, tmp_path: Path) -> None:
+    key = keys(cell)[0]
+    page.goto(f"{cell.url}/stops/{key}")
+    with page.expect_download(timeout=120_000) as download:
+        page.get_by_role("link", name="Fault parcel").click()
+    assert download.value.suggested_filename.startswith("fault-")
+    file = tmp_path / "fault.zip"
+    download.value.save_as(file)
+    with zipfile.ZipFile(file) as packed:
+        assert packed.testzip() is None
+        assert {"README.txt", "story.html", "page.html"} <= set(packed.namelist())
+        (tmp_path / "story.html").write_bytes(packed.read("story.html"))
+    page.goto((tmp_path / "story.html").as_uri())
+    expect(page.locator(".sentence")).to_contain_text("Fault")
+
+
+@pytest.mark.parametrize("language", ["en", "de", "ja"])
+def test_it_fits_each_screen_and_readers_can_use_it(
+    cell: Server, chromium: Browser, language: str
+) -> None:
+    context = chromium.new_context(locale=language)
+    page = context.new_page()
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        page.goto(f"{cell.url}/stops/{keys(cell)[0]}")
+        wide = page.evaluate(
+            "[...document.querySelectorAll('main.story *')].filter(e => e.clientWidth && "
+            "e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== 'inline')"
+            ".map(e => e.outerHTML)"
+        )
+        assert wide == [], (width, height)
+    assert violations(page) == []
+    context.close()
