@@ -138,6 +138,7 @@ SOURCE_KEYS: Final[Mapping[str, SourceKind]] = {
 DIAGNOSTICS: Final = "/diagnostics"
 DIAGNOSTIC_ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
 DIAGNOSTICS_AGE_S: Final = 30.0
+STOPPING_PRIORITY: Final = 2  # of alarms: this one and a higher one are a stop, which has a story
 SHIFT_S: Final = 8 * 3600.0
 
 if TYPE_CHECKING:

@@ -94,6 +94,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/diagnostics": MAINTENANCE,
     "/diagnostics/look": MAINTENANCE,
     "/recordings/last.mcap": MAINTENANCE,
+    "/recordings/{name}.mcap": MAINTENANCE,
     "/panel": ENGINEER,
     "/panel/check": ENGINEER,
     "/panel/file": ENGINEER,

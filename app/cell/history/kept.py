@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from app.cell.history.recording import SUFFIX, UNFINISHED
 
-NAME: Final = r"[0-9]{8}T[0-9]{6}\.[0-9]{3}Z(?:-[A-Za-z0-9_.-]{1,200})?"
+NAME: Final = r"[0-9]{8}T[0-9]{6}\.[0-9]{3}Z(?:-[A-Za-z0-9_-]{1,200})?(?:\.recovered)?"
 LONGEST_BEFORE_S: Final = 600.0  # a file begins so long before the time in its name, at most
 MOST_READ: Final = 20  # files whose summaries are read
 
@@ -27,6 +27,11 @@ class KeptRecording(NamedTuple):
     since: float
     until: float
     size: int
+
+    @property
+    def path(self) -> str:
+        """On the panel's server."""
+        return f"/recordings/{self.name}"
 
 
 def recordings_of(folder: Path, robot: str, since: float, until: float) -> list[KeptRecording]:

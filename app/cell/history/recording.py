@@ -1,4 +1,4 @@
-"""Recordings around presses, as MCAP files in a folder of limited size."""
+"""Recordings around presses and stops, as MCAP files in a folder of limited size."""
 
 import asyncio
 import fcntl
@@ -28,6 +28,7 @@ from app.panel.rules import RecordRules
 from app.ros.messages import Interfaces
 from app.system.disk_writer import DiskWriter
 from app.system.errors import LogError, os_error_text
+from app.system.limits import Quota, TokenBuckets
 from app.system.texts import TextLike, render, say
 
 # The latest samples, limited by age and bytes.
@@ -92,6 +93,7 @@ class RingBuffer:
 
 # One recording as an MCAP file (mcap.dev): profile "ros2", messages as received.
 
+FOLDER: Final = "recordings"  # of the data folder
 SUFFIX: Final = ".mcap"
 UNFINISHED: Final = ".mcap.unfinished"
 PROFILE: Final = "ros2"
@@ -526,15 +528,19 @@ class Recording:
         self._recordings.clear_fault()
 
 
-# Records one robot's samples and presses around each press. Used on the event loop only.
+# Records one robot's samples and presses around each press and each stop. Used on the event loop only.
 
 RECHECK_S: Final = 1.0
 LAST_S: Final = 60.0  # of the download of the last minute
 MAX_WAIT_S: Final = 600.0  # how long a recording waits for the receipt of a press
+STOP: Final = "stop"  # in the names of recordings that a stop began
+STOP_BEFORE_S: Final = 30.0  # of a stop that its recording has at least
+STOP_AFTER_S: Final = 5.0
+STOPS: Final = Quota(5, per_s=1 / 60)  # that begin or extend a recording
 
 
 class Recorder:
-    """Keeps the ring buffer, and a recording from a press until `after_s` after the last one."""
+    """Keeps the ring buffer, and a recording from a press or a stop until `after_s` after the last."""
 
     def __init__(
         self,
@@ -568,6 +574,9 @@ class Recorder:
         self._timer: asyncio.TimerHandle | None = None
         self._pending_presses: dict[str, str] = {}  # press → who
         self._last_event_at = 0.0  # monotonic seconds, of a press or a receipt
+        self._since = 0.0  # monotonic seconds: from then on the recording has messages
+        self._stopped_at = -math.inf  # monotonic seconds
+        self._stops = TokenBuckets(STOPS)
 
     @property
     def keys(self) -> frozenset[str]:
@@ -585,7 +594,7 @@ class Recorder:
     def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
         """A press was made; it is not checked yet."""
         if self._recording is None or self._recording.is_full:
-            self._begin_recording(widget)
+            self._begin_recording(widget, self._rules.before_s)
         self._pending_presses[press_id] = who
         at = datetime.now(UTC).isoformat(timespec="milliseconds")
         self._write_press(id=press_id, widget=widget, who=who, values=dict(inputs), outcome=None,
@@ -593,9 +602,25 @@ class Recorder:
 
     def record_receipt(self, receipt: Receipt) -> None:
         """A press got its receipt, or a correction of it."""
+        if receipt.outcome == "aborted":
+            self.record_stop()
         who = self._pending_presses.pop(receipt.id, "")
         self._write_press(id=receipt.id, widget=receipt.widget, who=who, values=dict(receipt.inputs),
                    outcome=receipt.outcome, reason=render(receipt.reason), at=receipt.at)  # fmt: skip
+
+    def record_stop(self) -> None:
+        """The machine has stopped: `STOP_BEFORE_S` before it and `STOP_AFTER_S` after it at least are
+        recorded. What happens within the latter is one stop; more than `STOPS` are not recorded."""
+        now = time.monotonic()
+        if now - self._stopped_at < STOP_AFTER_S or not self._stops.has_token(STOP):
+            return
+        self._stops.take_token(STOP)
+        self._stopped_at = now
+        before = max(self._rules.before_s, STOP_BEFORE_S)
+        if self._recording is None or self._recording.is_full or self._since > now - before:
+            self._begin_recording(STOP, before)
+        self._last_event_at = now
+        self._stop_after(max(self._rules.after_s, STOP_AFTER_S))
 
     async def last_minute(self) -> bytes:
         """What was received in the last `LAST_S` seconds, as an MCAP file; less where it is more than
@@ -622,11 +647,15 @@ class Recorder:
             self._recording.finish()
             self._recording = None
 
-    def _begin_recording(self, widget: str) -> None:
+    def _begin_recording(self, cause: str, before_s: float) -> None:
+        """`cause` is the id of a widget, or STOP."""
         self._close()
-        name = recording_name(time.time(), self._robot_id, widget)
-        self._recording = self._recordings.begin(name, self._channels, self._metadata)
-        for buffered in self._ring.recent(time.monotonic(), self._rules.before_s):
+        name = recording_name(time.time(), self._robot_id, cause)
+        about = self._metadata | {"before_s": f"{before_s:g}"}
+        self._recording = self._recordings.begin(name, self._channels, about)
+        now = time.monotonic()
+        self._since = now - before_s
+        for buffered in self._ring.recent(now, before_s):
             self._recording.add(buffered)
 
     def _write_press(self, **press: Any) -> None:

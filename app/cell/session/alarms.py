@@ -56,7 +56,7 @@ from app.cell.robot.state import RobotState
 from app.cell.session.alarm_curves import AlarmCurves
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.turn import RobotAlarms
-from app.panel.alarm import AlarmRules
+from app.panel.alarm import STOPPING_PRIORITY, AlarmRules
 from app.panel.model import Panel
 from app.records.press_record import Log
 from app.system.texts import TextLike, joined, say
@@ -509,12 +509,20 @@ class Alarms:
                 self.curves.plan(alarm)
             row = history_row(alarm, transition)
             self.mqtt.put(row)
+            if row.event == "raised" and row.priority <= STOPPING_PRIORITY:
+                self._report_stop(row.robot)
             shown = None if alarm.is_unlisted else row_of(alarm, transition.at)
             if not is_kept(alarm.definition):
                 self._shown.update(transition.id, shown)
                 self._show()
                 continue
             self._put(transition.id, row, None if shown is None else row.record, shown)
+
+    def _report_stop(self, robot_id: str) -> None:
+        """To the robot of an alarm; of one of the panel itself ("") to all."""
+        for robot in self._robots:
+            if robot_id in ("", robot.robot_id):
+                robot.stopped.emit()
 
     def _put(
         self, alarm_id: str, row: HistoryRow | None, record: str | None, shown: AlarmRow | None

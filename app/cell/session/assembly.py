@@ -193,9 +193,9 @@ def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
     """Imports the MCAP writer only if the panel records: it takes time and memory."""
     if panel.record is None:
         return None
-    from app.cell.history.recording import Recordings
+    from app.cell.history.recording import FOLDER, Recordings
 
-    folder = settings.data_folder(mode_of(settings, panel)) / "recordings"
+    folder = settings.data_folder(mode_of(settings, panel)) / FOLDER
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
 
 

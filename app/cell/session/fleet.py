@@ -229,6 +229,15 @@ class Fleet:
 
         return MapPictures()
 
+    @property
+    def recordings_folder(self) -> Path | None:
+        """That of a panel that records."""
+        if self.panel.record is None or self.states is None:
+            return None
+        from app.cell.history.recording import FOLDER
+
+        return self.states.with_name(FOLDER)
+
     async def start(self) -> None:
         """Starts all sessions. Does not wait for the robots."""
         for session in self.sessions:

@@ -379,6 +379,8 @@ def wire_session(
     act_context = ActContext(press_guard, press_log, robot.name, signals.changed.emit)
     peer = access.peer(context)
     recorder = _recorder(server, context, entry)
+    if recorder is not None:
+        robot_alarms.stopped.connect(recorder.record_stop)
     recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
     commands = RobotCommands(context, peer, press_guard, press_log, recorder, recipes)
     published_alarms = PublishedAlarms(
@@ -400,7 +402,7 @@ def wire_session(
         robot,
         commands.sample_handlers,
         [robot.table_entries, log_lines, published_alarms, *recorders, *map_listeners],
-        _observers(server, context),
+        _observers(server, context, recorder),
     )
     own_line = partial(_show_own_line, robot, refresher)
     session = RobotSession(
@@ -454,13 +456,17 @@ def wire_session(
     return session
 
 
-def _observers(server: ServerParts, context: RobotContext) -> "list[ChangeObserver]":
+def _observers(
+    server: ServerParts, context: RobotContext, recorder: "Recorder | None"
+) -> "list[ChangeObserver]":
     """What records the changes from which a stop is explained; nothing on a panel without a journal."""
     if server.journal is None:
         return []
     from app.cell.stops.changes import ChangeObserver
 
     observer = ChangeObserver(context.panel, context.robot, server.journal)
+    if recorder is not None:
+        observer.on_stop = recorder.record_stop
     context.signals.stepped.connect(observer.step)
     context.signals.ran.connect(observer.finish)
     return [observer]

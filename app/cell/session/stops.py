@@ -33,7 +33,6 @@ from app.cell.stops.oee import (
     without,
 )
 from app.cell.stops.sources import (
-    STOPPING_PRIORITY,
     PanelNames,
     alarm_events,
     alarm_stops,
@@ -45,6 +44,7 @@ from app.cell.stops.sources import (
 )
 from app.cell.stops.story import AFTER_S, BEFORE_S, MOST_EVENTS, Event, Stop, StopSort, Story, story_of
 from app.cell.view.times import duration_text
+from app.panel.alarm import STOPPING_PRIORITY
 from app.panel.model import Panel
 from app.records import Filter, LogRow, NullLog, OperatorLog
 from app.system.clock import format_time

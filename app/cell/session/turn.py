@@ -139,6 +139,7 @@ class RobotAlarms:
         """`evaluate` is called when alarms may be due."""
         self.evaluation_began = Signal[[]]()  # alarms are evaluated from now on
         self.rows_changed = Signal[[]]()  # the alarms that pages show have changed
+        self.stopped = Signal[[]]()  # an alarm was raised that has a story of a stop
         self.locks_changed = Signal[[]]()  # alarms lock other controls than before
         self.marks_changed = Signal[[Collection[str]]]()  # of values of topics with these keys
         self.robot_id = robot_id

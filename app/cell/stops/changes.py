@@ -11,7 +11,7 @@ import math
 import sqlite3
 import time
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,6 +35,9 @@ from app.system.texts import Text, TextLike
 log = logging.getLogger("kiosk.stops")
 
 ChangeSort = Literal["state", "interlock", "condition", "link", "publisher", "node", "clock"]
+
+
+STOPPING_SORTS: Final[Collection[ChangeSort]] = ("state", "link")
 
 
 class Change(NamedTuple):
@@ -84,11 +87,13 @@ class _Watched:
 @dataclass(slots=True)
 class ChangeObserver:
     """Observes a robot from the first step of its turn on. A listener of samples too, for the times
-    that its peer has put on them. Used on the event loop only."""
+    that its peer has put on them. `on_stop` is called when the state is a stop, or the link is lost.
+    Used on the event loop only."""
 
     panel: Panel
     robot: RobotState
     journal: "ChangeJournal"
+    on_stop: Callable[[], None] = lambda: None
     _watched: dict[str, list[_Watched]] = field(default_factory=dict)  # by the topic's key
     _samples: dict[tuple[str, float], Sample] = field(default_factory=dict)
     _unsent: list[tuple[str, Change]] = field(default_factory=list)
@@ -145,6 +150,8 @@ class ChangeObserver:
             if sample is not None and sent is not None:
                 change = change._replace(sent=sent, clock=sample.source or "")
             self.journal.add(change)
+            if change.breaks and change.sort in STOPPING_SORTS:
+                self.on_stop()
         self._unsent.clear()
         self._samples.clear()
 

@@ -12,7 +12,7 @@ from app.cell.alarms.records import text_of, written_limit, written_value
 from app.cell.alarms.shown import panel_id
 from app.cell.stops.changes import Change, text_in_json
 from app.cell.stops.story import AFTER_S, Event, Sort, Source, Stop
-from app.panel.alarm import Alarm
+from app.panel.alarm import STOPPING_PRIORITY, Alarm
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
 from app.panel.widgets.service_action import Action
@@ -22,7 +22,6 @@ from app.records.entry import GOOD_OUTCOMES
 from app.system.printable import printable
 from app.system.texts import TextLike, joined, say
 
-STOPPING_PRIORITY: Final = 2  # an alarm of this priority or a higher one has a story
 NODE, LINK = "node", "link"  # the names of sources that are no topics
 CHANGE_WORDS: Final[Mapping[tuple[str, bool], str]] = {
     ("link", True): "story_link_lost",

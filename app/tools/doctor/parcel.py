@@ -23,7 +23,7 @@ from app.cell.alarms.export import HistoryReader
 from app.cell.alarms.history import HistoryFilter
 from app.cell.alarms.report import NAME as STATES
 from app.cell.alarms.store import NAME as ALARMS
-from app.cell.history.recording import PRESS_TOPIC
+from app.cell.history.recording import FOLDER, PRESS_TOPIC
 from app.cell.session.stops import StopReader, StopStores, read_alarms
 from app.cell.stops.sources import PanelNames
 from app.cell.stops.story import AFTER_S, BEFORE_S, Stop, Story
@@ -331,13 +331,13 @@ def _add_alarms(parcel: ParcelFile, folder: Path, moment: Moment, language: str)
 
 
 def _add_recordings(parcel: ParcelFile, folder: Path, panel: Panel, moment: Moment) -> None:
-    name = "recordings/"
+    name = f"{FOLDER}/"
     if panel.record is None:
         parcel.left_out.append((name, "the panel records nothing: its file has no [record]"))
         return
     from app.cell.history.kept import has_unfinished, recordings_of  # imports MCAP
 
-    recorded = folder / "recordings"
+    recorded = folder / FOLDER
     kept = recordings_of(recorded, moment.robot, moment.at - BEFORE_S, moment.at + AFTER_S)
     kept.sort(key=lambda each: not each.since <= moment.at <= each.until)
     if has_unfinished(recorded, moment.robot):

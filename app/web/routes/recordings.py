@@ -1,10 +1,12 @@
-"""The last minute as an MCAP file, for Foxglove and rosbag2: downloaded, or shared with Foxglove."""
+"""MCAP files for Foxglove and rosbag2: the last minute, downloaded or shared with Foxglove, and those
+that are kept."""
 
+import asyncio
 from datetime import UTC, datetime
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import Response
+from fastapi.responses import FileResponse, Response
 
 from app.system.errors import NotFound
 from app.system.texts import say
@@ -30,6 +32,9 @@ PREFLIGHT: Final = {
     "access-control-max-age": "600",
 }
 FILE: Final = {"schema": {"type": "string", "format": "binary"}}
+# As `recording_name` has it.
+NAME: Final = r"^[0-9]{8}T[0-9]{6}\.[0-9]{3}Z(-[A-Za-z0-9_-]{1,200})?(\.recovered)?$"
+Name = Annotated[str, Path(max_length=240, pattern=NAME)]
 Token = Annotated[str, Path(min_length=20, max_length=64, pattern=r"^[A-Za-z0-9_-]+$")]
 
 
@@ -57,6 +62,27 @@ async def last_minute(
         "content-encoding": "identity",  # it is packed already
     }
     return Response(content, media_type=MCAP, headers=headers)
+
+
+@router.get(
+    "/recordings/{name}.mcap",
+    response_class=Response,
+    summary="A recording around a press or a stop",
+    responses=errors(403, 404, 422)
+    | {
+        200: {"content": {MCAP: FILE}, "description": "the whole file"},
+        206: {"content": {MCAP: FILE}, "description": "the ranges of `Range`"},
+        416: {"description": "the file has nothing of the range"},
+    },
+)
+async def kept_recording(state: CurrentState, name: Name) -> Response:
+    """404 for one that is removed, or not finished yet."""
+    folder = state.fleet.recordings_folder
+    file = folder / f"{name}.mcap" if folder else None
+    if file is None or not await asyncio.to_thread(lambda: file.is_file() and not file.is_symlink()):
+        raise NotFound(say("recording_gone"))
+    headers = {"cache-control": "no-store", "content-encoding": "identity"}
+    return FileResponse(file, media_type=MCAP, filename=file.name, headers=headers)
 
 
 @router.get(

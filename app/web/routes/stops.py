@@ -1,11 +1,12 @@
 """Why the machine stopped: the list of stops, and the story of each as a page and as JSON."""
 
+import asyncio
 import secrets
 import time
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from itertools import groupby
-from typing import Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_args
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
@@ -36,6 +37,9 @@ from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import day_name, who_of
 from app.web.pages.log_words import word as log_word
 from app.web.requests import SINCE, TEXT, FormFields, described_body, errors
+
+if TYPE_CHECKING:
+    from app.cell.history.kept import KeptRecording
 
 router = APIRouter()
 
@@ -134,6 +138,13 @@ class ToDo(NamedTuple):
     picture: TextLike
 
 
+class ShownRecording(NamedTuple):
+    """The link to a recording; `at` says where the stop is in it."""
+
+    path: str
+    at: TextLike
+
+
 class StoryContext(TypedDict):
     """The variables of `stop.html`, beside those of the frame."""
 
@@ -149,6 +160,7 @@ class StoryContext(TypedDict):
     to_do: ToDo
     asked: AskedStop | None
     parcel: bool
+    recording: ShownRecording | None
     alarm_word: Any
     log_word: Any
     word: Any
@@ -271,6 +283,9 @@ async def story_page(
     asked = await _asked(state, reader, story.stop, query.act)
     context = story_context(story, end, names, bool(query.all), language, asked)
     context["parcel"] = caller_of(request).principal.meets(MAINTENANCE)
+    if context["parcel"] and (recording := await _recording(state, story.stop)):
+        offset = number(f"{story.stop.at - recording.since:.1f}", "s")
+        context["recording"] = ShownRecording(recording.path, word("recording_at", offset=offset))
     return framed_page(request, state, page, context)
 
 
@@ -284,6 +299,13 @@ async def story_json(request: Request, state: CurrentState, key: Key) -> JSONRes
     story = await reader.story(*sort_and_number(key))
     end = await reader.end_of(story.stop)
     answer = story_answer(story, end, caller_of(request).language)
+    recording = await _recording(state, story.stop)
+    answer["recording"] = recording and {
+        "path": f"{state.root}{recording.path}",
+        "since": iso_time(recording.since),
+        "until": iso_time(recording.until),
+        "offset_s": round(story.stop.at - recording.since, 3),
+    }
     return JSONResponse(answer, headers={"cache-control": "no-store"})
 
 
@@ -311,6 +333,17 @@ async def parcel(request: Request, state: CurrentState, key: Key) -> Response:
 
 def _reader(state: AppState) -> StopReader:
     return StopReader(stores_of(state.fleet, state.log))
+
+
+async def _recording(state: AppState, stop: Stop) -> "KeptRecording | None":
+    """That which has the most of what was before the stop; None without one."""
+    folder = state.fleet.recordings_folder
+    if folder is None:
+        return None
+    from app.cell.history.kept import recordings_of  # imports MCAP
+
+    kept = await asyncio.to_thread(recordings_of, folder, stop.robot, stop.at, stop.at)
+    return min(kept, key=lambda each: each.since, default=None)
 
 
 async def _asked(state: AppState, reader: StopReader, stop: Stop, act: str) -> AskedStop | None:
@@ -382,6 +415,7 @@ def story_context(
         to_do=to_do(story, names, language),
         asked=asked,
         parcel=False,
+        recording=None,
         alarm_word=alarm_word,
         log_word=log_word,
         word=word,

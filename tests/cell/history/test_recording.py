@@ -16,10 +16,13 @@ from rosbags.typesys import get_types_from_msg
 
 from app.cell.commands.press import fingerprint
 from app.cell.commands.receipts import Receipt
+from app.cell.history import recording
 from app.cell.history.recording import (
     COPY_BELOW_BYTES,
     OVERHEAD_BYTES,
     PRESS_TOPIC,
+    STOP_AFTER_S,
+    STOPS,
     UNFINISHED,
     Channel,
     McapFile,
@@ -465,3 +468,75 @@ def test_maps_and_their_updates_are_recorded_only_where_they_are_named(tmp_path:
     assert usual - {"operation_enabled"} == {"tf", "tf_static", "scan"}
     named = RecordRules(topics=("/map_updates",))
     assert asyncio.run(recorded(named)) == {"map_updates"}
+
+
+# Around stops.
+
+
+def said_in(path: Path) -> list[str]:
+    with path.open("rb") as stream:
+        read = make_reader(stream).iter_messages(["/heard"])
+        return [INTERFACES.decode(TEXT, message.data).data for _, _, message in read]
+
+
+def files_of(cell: Cell) -> list[Path]:
+    return sorted(cell.folder.glob("*.mcap"))
+
+
+def test_a_stop_begins_a_recording_of_the_half_minute_before_it(run: Callable[..., None]) -> None:
+    async def test(cell: Cell) -> None:
+        cell.says("too old", ago=40.0)
+        cell.says("before", ago=25.0)
+        cell.recorder.record_stop()
+        cell.says("after")
+        cell.recorder.record_stop()  # the state and an alarm of one stop
+        await pass_time(STOP_AFTER_S)
+        await cell.finished()
+        (path,) = files_of(cell)
+        assert path.name.endswith("Z-stop.mcap")
+        assert said_in(path) == ["before", "after"]
+
+    run(test)
+
+
+def test_a_stop_soon_after_a_press_has_its_half_minute_too(run: Callable[..., None]) -> None:
+    async def test(cell: Cell) -> None:
+        cell.says("before", ago=25.0)
+        cell.press()
+        cell.recorder.record_stop()
+        cell.says("after")
+        cell.press("p2")  # extends the recording of the stop
+        await pass_time(STOP_AFTER_S)
+        await cell.finished(2)
+        by_cause = {path.name.rpartition("-")[2]: said_in(path) for path in files_of(cell)}
+        assert by_cause == {"free.mcap": [], "stop.mcap": ["before", "after"]}
+
+    run(test)
+
+
+def test_a_goal_that_is_aborted_is_a_stop(run: Callable[..., None]) -> None:
+    async def test(cell: Cell) -> None:
+        cell.says("before", ago=25.0)
+        cell.press(outcome="aborted")
+        await pass_time(STOP_AFTER_S)
+        await cell.finished(2)
+        stop = next(path for path in files_of(cell) if path.name.endswith("-stop.mcap"))
+        assert said_in(stop) == ["before"]
+
+    run(test)
+
+
+def test_a_machine_that_stops_again_and_again_does_not_fill_the_folder(
+    run: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording, "STOP_AFTER_S", 0.0)
+
+    async def test(cell: Cell) -> None:
+        for _ in range(20):
+            cell.recorder.record_stop()
+            cell.recorder.stop()
+            await asyncio.sleep(0.002)  # file names have milliseconds
+        await cell.finished(round(STOPS.burst))
+        assert len(files_of(cell)) == STOPS.burst
+
+    run(test)
