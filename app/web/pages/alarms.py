@@ -191,7 +191,7 @@ class ShownCurve(NamedTuple):
 def shown_curve(alarm: AlarmInstance, curve: Curve) -> ShownCurve:
     """What the details of an alarm show of its curve."""
     described = alarm.definition.alarm
-    trend = _trend(described)
+    trend = trend_of(described)
     columns = scaled_columns(curve.columns, trend.pens[0])
     begin, end = curve.raised_at - BEFORE_S, curve.raised_at + AFTER_S
     return ShownCurve(
@@ -206,7 +206,7 @@ def shown_curve(alarm: AlarmInstance, curve: Curve) -> ShownCurve:
     )
 
 
-def _trend(alarm: Alarm) -> Trend:
+def trend_of(alarm: Alarm) -> Trend:
     """The trend whose one pen has the alarm's value and its limits nearest to what is normal."""
     low = alarm.low_low if alarm.low is None else alarm.low
     high = alarm.high_high if alarm.high is None else alarm.high

@@ -36,6 +36,7 @@ from app.web.pages.alarms import word as alarm_word
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import day_name, who_of
 from app.web.pages.log_words import word as log_word
+from app.web.pages.story_curves import StoryCurves, story_curves
 from app.web.requests import SINCE, TEXT, FormFields, described_body, errors
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 router = APIRouter()
 
+WRITTEN_S: Final = 600.0  # after which the recording of a stop is not expected any more
 DAYS_S: Final = 7 * 86_400.0  # that the list goes back
 STOP_SORTS: Final[tuple[StopSort, ...]] = get_args(StopSort)
 KEY: Final = rf"^({'|'.join(STOP_SORTS)})-[1-9][0-9]{{0,17}}$"
@@ -139,7 +141,8 @@ class ToDo(NamedTuple):
 
 
 class ShownRecording(NamedTuple):
-    """The link to a recording; `at` says where the stop is in it."""
+    """The link to a recording; `at` says where the stop is in it. `path` is "" while it is written, and
+    `at` says so."""
 
     path: str
     at: TextLike
@@ -161,6 +164,7 @@ class StoryContext(TypedDict):
     asked: AskedStop | None
     parcel: bool
     recording: ShownRecording | None
+    curves: StoryCurves | None
     alarm_word: Any
     log_word: Any
     word: Any
@@ -282,10 +286,11 @@ async def story_page(
     language = caller_of(request).language
     asked = await _asked(state, reader, story.stop, query.act)
     context = story_context(story, end, names, bool(query.all), language, asked)
+    robot = state.fleet.of_robot(story.stop.robot).robot
+    context["curves"] = story_curves(story, names, robot, time.monotonic(), time.time())
     context["parcel"] = caller_of(request).principal.meets(MAINTENANCE)
-    if context["parcel"] and (recording := await _recording(state, story.stop)):
-        offset = number(f"{story.stop.at - recording.since:.1f}", "s")
-        context["recording"] = ShownRecording(recording.path, word("recording_at", offset=offset))
+    if context["parcel"]:
+        context["recording"] = await _shown_recording(state, story.stop)
     return framed_page(request, state, page, context)
 
 
@@ -344,6 +349,19 @@ async def _recording(state: AppState, stop: Stop) -> "KeptRecording | None":
 
     kept = await asyncio.to_thread(recordings_of, folder, stop.robot, stop.at, stop.at)
     return min(kept, key=lambda each: each.since, default=None)
+
+
+async def _shown_recording(state: AppState, stop: Stop) -> ShownRecording | None:
+    if recording := await _recording(state, stop):
+        offset = number(f"{stop.at - recording.since:.1f}", "s")
+        return ShownRecording(recording.path, word("recording_at", offset=offset))
+    folder = state.fleet.recordings_folder
+    if folder is None or time.time() - stop.at > WRITTEN_S:
+        return None
+    from app.cell.history.kept import has_unfinished  # imports MCAP
+
+    is_written = await asyncio.to_thread(has_unfinished, folder, stop.robot)
+    return ShownRecording("", word("recording_going")) if is_written else None
 
 
 async def _asked(state: AppState, reader: StopReader, stop: Stop, act: str) -> AskedStop | None:
@@ -416,6 +434,7 @@ def story_context(
         asked=asked,
         parcel=False,
         recording=None,
+        curves=None,
         alarm_word=alarm_word,
         log_word=log_word,
         word=word,
