@@ -3,10 +3,8 @@ that can't be read is left out."""
 
 import math
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -35,10 +33,16 @@ class KeptRecording(NamedTuple):
 
 
 def recordings_of(folder: Path, robot: str, since: float, until: float) -> list[KeptRecording]:
-    """The recordings of a robot ("" for the only one) that have messages between two times, the one
-    with the latest beginning first; none without a folder."""
-    candidates = (file for file in _newest_first(folder) if _may_cover(file, robot, since, until))
-    kept = (_read(file) for file in islice(candidates, MOST_READ))
+    """The recordings of a robot ("" for the only one) that have messages between two times, those first
+    whose press or stop is nearest to the later one; none without a folder."""
+    candidates: list[tuple[float, Path]] = []
+    with suppress(OSError):
+        for file in folder.glob(f"*{SUFFIX}"):
+            begun = _begun(file, robot)
+            if begun is not None and begun - LONGEST_BEFORE_S <= until:
+                candidates.append((abs(begun - until), file))
+    candidates.sort()
+    kept = [_read(file, since) for _, file in candidates[:MOST_READ]]
     return [each for each in kept if each and each.since <= until and each.until >= since]
 
 
@@ -49,11 +53,6 @@ def has_unfinished(folder: Path, robot: str) -> bool:
     return False
 
 
-def _newest_first(folder: Path) -> Iterator[Path]:
-    with suppress(OSError):
-        yield from sorted(folder.glob(f"*{SUFFIX}"), key=lambda file: file.name, reverse=True)
-
-
 def _is_of(file: Path, robot: str) -> bool:
     name = file.name.split(".mcap")[0]
     rest = name.partition("-")[2]
@@ -62,19 +61,24 @@ def _is_of(file: Path, robot: str) -> bool:
     )
 
 
-def _may_cover(file: Path, robot: str, since: float, until: float) -> bool:
-    if not _is_of(file, robot) or file.is_symlink():
-        return False
-    with suppress(OSError, ValueError):
-        begun = datetime.strptime(file.name[:19], "%Y%m%dT%H%M%S.%f").replace(tzinfo=UTC).timestamp()
-        return begun - LONGEST_BEFORE_S <= until and file.stat().st_mtime >= since
-    return False
+def _begun(file: Path, robot: str) -> float | None:
+    """The time in the name of a robot's file, in seconds since the epoch; None for another file."""
+    if not _is_of(file, robot):
+        return None
+    with suppress(ValueError):
+        begun = datetime.strptime(file.name[:19], "%Y%m%dT%H%M%S.%f")
+        return begun.replace(tzinfo=UTC).timestamp()
+    return None
 
 
-def _read(file: Path) -> KeptRecording | None:
-    """None for a file without messages, and for one that can't be read, whatever is in it."""
-    with suppress(Exception), file.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
+def _read(file: Path, since: float) -> KeptRecording | None:
+    """None for a file without messages or from before a time, and for one that can't be read, whatever
+    is in it."""
+    with suppress(Exception):
+        if file.is_symlink() or file.stat().st_mtime < since:
+            return None
+        with file.open("rb") as stream:
+            summary = make_reader(stream).get_summary()
         about = summary.statistics if summary else None
         if about is not None and about.message_count:
             times = about.message_start_time / 1e9, about.message_end_time / 1e9
