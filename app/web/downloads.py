@@ -19,6 +19,7 @@ from fastapi.responses import FileResponse, Response
 from starlette.datastructures import MutableHeaders
 from starlette.types import Message, Receive, Scope, Send
 
+from app.system.clock import iso_time
 from app.system.errors import KioskError
 from app.system.worker import RunningWorker
 
@@ -151,7 +152,8 @@ class MemoryFile:
 @dataclass(frozen=True, slots=True, repr=False)
 class SharedRecording:
     """An MCAP file as it was at `at`; `until` is when it ends: both in seconds since the epoch. `robot`
-    is the robot's id, "" on a panel with one robot; `act_id` is the act that shared it."""
+    is the robot's id, "" on a panel with one robot; `act_id` is the act that shared it. `stop` is the
+    key of the stop that it is about and `moment` the time of that, "" and None of a last minute."""
 
     token: str
     file: MemoryFile
@@ -159,6 +161,8 @@ class SharedRecording:
     act_id: str
     at: float
     until: float
+    stop: str = ""
+    moment: float | None = None
 
 
 class SharedRecordings:
@@ -168,7 +172,9 @@ class SharedRecordings:
         self._valid_s = valid_s
         self._by_token: OrderedDict[str, SharedRecording] = OrderedDict()  # the oldest first
 
-    def share(self, content: bytes, robot: str, act_id: str) -> SharedRecording:
+    def share(
+        self, content: bytes, robot: str, act_id: str, stop: str = "", moment: float | None = None
+    ) -> SharedRecording:
         """Shares a file under a new token; the oldest ones end if there are too many."""
         now = time.time()
         recording = SharedRecording(
@@ -178,6 +184,8 @@ class SharedRecordings:
             act_id=act_id,
             at=now,
             until=now + self._valid_s,
+            stop=stop,
+            moment=moment,
         )
         self._by_token[recording.token] = recording
         while len(self._by_token) > 1 and self._too_many():
@@ -194,8 +202,13 @@ class SharedRecordings:
         return next((shared for shared in self._by_token.values() if shared.act_id == act_id), None)
 
     def latest(self, robot: str) -> SharedRecording | None:
-        """The newest recording of a robot, until it ends."""
-        return next((s for s in reversed(self._by_token.values()) if s.robot == robot), None)
+        """The newest last minute of a robot, until it ends."""
+        shared = (s for s in reversed(self._by_token.values()) if s.robot == robot and not s.stop)
+        return next(shared, None)
+
+    def of_stop(self, stop: str) -> SharedRecording | None:
+        """The newest recording of a stop, by its key, until it ends."""
+        return next((s for s in reversed(self._by_token.values()) if s.stop == stop), None)
 
     def _too_many(self) -> bool:
         size = sum(recording.file.size for recording in self._by_token.values())
@@ -236,5 +249,8 @@ class SharedLinks(NamedTuple):
 def links_of(recording: SharedRecording, base_url: str) -> SharedLinks:
     """The links of a recording; `base_url` is that of the panel as the client names it."""
     address = f"{base_url.rstrip('/')}/recordings/shared/{recording.token}.mcap"
-    source = urlencode({"ds": "remote-file", "ds.url": address})
+    query = {"ds": "remote-file", "ds.url": address}
+    if recording.moment is not None:
+        query["time"] = iso_time(recording.moment)  # where Foxglove begins
+    source = urlencode(query)
     return SharedLinks(recording, address, f"{BROWSER}?{source}", f"{DESKTOP}?{source}")

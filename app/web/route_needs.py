@@ -62,6 +62,7 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/control/{act}": ANYBODY,
     "/diagnostics/{act}": ANYBODY,
     "/stops/{key}/reason": ANYBODY,
+    "/stops/{key}/foxglove": ANYBODY,
     "/recipes/{set}/{act}": ANYBODY,
     "/recipes/{set}/import": ANYBODY,
     "/places/{widget}/{act}": ANYBODY,

@@ -331,10 +331,10 @@ def test_all_acts_are_here() -> None:
         "places": PLACE_ACTS,
     }
     assert {(room, act) for room, acts in tables.items() for act in acts} <= named
-    # Those on stops are sent in tests/web/test_oee.py, and that of a parcel in
-    # tests/tools/doctor/test_parcel.py, as this cell has no stop.
+    # Those on stops are sent in tests/web/test_oee.py, those of parcels and recordings in
+    # tests/tools/doctor/test_parcel.py and tests/web/test_stop_recordings.py, as this cell has no stop.
     assert ([*SHIFT_ACTS], ("alarms", "report") in named) == (
-        ["message", "reason", "parcel", "later"],
+        ["message", "reason", "parcel", "foxglove", "later"],
         True,
     )
 

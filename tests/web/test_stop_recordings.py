@@ -1,9 +1,13 @@
 """The recording that a stop begins: its link in the story, as a page and as JSON, and the file."""
 
 import io
+import re
+from html import unescape
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
+import httpx
 from mcap.reader import make_reader
 
 from tests.support.parts import Server, until
@@ -57,6 +61,31 @@ def test_the_story_leads_into_the_recording_at_its_moment(tmp_path: Path) -> Non
         assert server.http.get("/recordings/operators-log.mcap").status_code == 422
 
 
+def test_it_is_shared_with_foxglove_which_begins_at_the_stop(tmp_path: Path) -> None:
+    with demo_server(tmp_path, PANEL + RECORD) as server:
+        told = recorded(server)
+        path = f"/stops/{told['stop']['key']}"
+        receipt = server.http.post(f"{path}/foxglove", json={}).raise_for_status().json()
+        assert (receipt["outcome"], receipt["done"]) == ("succeeded", True)
+        shared = httpx.get(receipt["recording"], trust_env=False)  # without a cookie of the panel
+        assert shared.content == server.http.get(told["recording"]["path"]).content
+        answer = server.http.post(f"{path}/foxglove", data={"id": "0123456789abcdef"})
+        assert (answer.status_code, answer.headers["location"]) == (303, path)
+        page = server.http.get(path, headers={"accept": "text/html"}).text
+        (browser, desktop) = re.findall(r'href="((?:https://app\.foxglove\.dev|foxglove:)[^"]+)"', page)
+        for link in (browser, desktop):
+            query = parse_qs(urlsplit(unescape(link)).query)
+            assert query["time"] == [told["stop"]["at"]]
+            assert query["ds.url"][0].startswith(f"{server.url}/recordings/shared/")
+        log = server.http.get("/log", headers={"accept": "text/html"}).text
+        assert log.count("was shared with Foxglove") == 2
+        diagnostics = server.http.get("/diagnostics", headers={"accept": "text/html"}).text
+        assert "app.foxglove.dev" not in diagnostics  # it has the last minute only
+        for file in (server.data / "recordings").glob("*.mcap"):
+            file.unlink()
+        assert server.http.post(f"{path}/foxglove", json={}).status_code == 404
+
+
 def test_an_alarm_of_priority_2_begins_one(tmp_path: Path) -> None:
     with demo_server(tmp_path, ALARM + RECORD) as server:
         assert recorded(server)["stop"]["sort"] == "alarm"
@@ -72,6 +101,8 @@ def test_a_recording_needs_maintenance(tmp_path: Path) -> None:
         told = recorded(server)
         path = told["recording"]["path"]
         assert server.http.get(path).status_code == 403
+        refused = server.http.post(f"/stops/{told['stop']['key']}/foxglove", json={})
+        assert (refused.status_code, refused.json()["done"]) == (403, False)
         page = server.http.get(f"/stops/{told['stop']['key']}", headers={"accept": "text/html"}).text
         assert path not in page
 

@@ -1,5 +1,5 @@
-"""Acts of a shift: the rows of a message to the next shift, of the reason of a stop, of "later", and of
-a fault parcel.
+"""Acts of a shift: the rows of a message to the next shift, of the reason of a stop, of "later", of a
+fault parcel, and of a recording that is shared with Foxglove.
 
 `ActRequest.values` has the `text` of a message; of a stop its key `stop`, when it `began` (RFC 3339)
 and the id of its `reason`. `object` is then the key of the stop. All of it is only in the operator's
@@ -50,7 +50,7 @@ def _postpone(_: OeeRules | None, request: ActRequest) -> StopAct:
 
 
 def _take(_: OeeRules | None, request: ActRequest) -> StopAct:
-    """The caller makes the parcel once the act is logged."""
+    """The caller makes the parcel, or shares the recording, once the act is logged."""
     return StopAct(began=_began(request))
 
 
@@ -75,6 +75,13 @@ SHIFT_ACTS: Final[Mapping[str, Act[OeeRules | None, Any]]] = {
         server_permits,
         _take,
         lambda act: say("log_done_stop_parcel", time=act.began),
+        MAINTENANCE,
+    ),
+    "foxglove": Act(
+        "log_page_diagnostics_foxglove",
+        server_permits,
+        _take,
+        lambda act: say("log_done_stop_foxglove", time=act.began),
         MAINTENANCE,
     ),
     "later": Act(

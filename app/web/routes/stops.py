@@ -31,7 +31,7 @@ from app.web.acts import ActBody, act_responses, said_of, sent_act
 from app.web.answers import ActAnswer
 from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
-from app.web.downloads import exported_zip
+from app.web.downloads import BYTES_MOST, SharedLinks, exported_zip, links_of
 from app.web.pages.alarms import word as alarm_word
 from app.web.pages.context import FramedPage, framed_page
 from app.web.pages.log_words import day_name, who_of
@@ -98,6 +98,16 @@ class ReasonReceipt(ActAnswer):
     """The receipt: `reason` is "" where it was done, `code` is its stable name."""
 
 
+FOXGLOVE_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "_since": SINCE})
+
+
+class FoxgloveReceipt(ActAnswer):
+    """The receipt: `reason` is "" where it was done, `code` is its stable name. `recording` is the
+    address of the recording that was shared."""
+
+    recording: str
+
+
 class AskedStop(NamedTuple):
     """The keys by which the reason of a stop is given; `chosen` is the id of the newest, `answer` says
     who gave it. `refused`: why an act was refused."""
@@ -142,10 +152,14 @@ class ToDo(NamedTuple):
 
 class ShownRecording(NamedTuple):
     """The link to a recording; `at` says where the stop is in it. `path` is "" while it is written, and
-    `at` says so."""
+    `at` says so. `shared` are the links of one that is shared with Foxglove, `refused` is why it was
+    not."""
 
     path: str
     at: TextLike
+    shared: SharedLinks | None = None
+    shared_until: TextLike = ""
+    refused: TextLike = ""
 
 
 class StoryContext(TypedDict):
@@ -165,6 +179,7 @@ class StoryContext(TypedDict):
     parcel: bool
     recording: ShownRecording | None
     curves: StoryCurves | None
+    say: Any
     alarm_word: Any
     log_word: Any
     word: Any
@@ -290,7 +305,7 @@ async def story_page(
     context["curves"] = story_curves(story, names, robot, time.monotonic(), time.time())
     context["parcel"] = caller_of(request).principal.meets(MAINTENANCE)
     if context["parcel"]:
-        context["recording"] = await _shown_recording(state, story.stop)
+        context["recording"] = await _shown_recording(request, state, story.stop, query.act)
     return framed_page(request, state, page, context)
 
 
@@ -312,6 +327,36 @@ async def story_json(request: Request, state: CurrentState, key: Key) -> JSONRes
         "offset_s": round(story.stop.at - recording.since, 3),
     }
     return JSONResponse(answer, headers={"cache-control": "no-store"})
+
+
+@router.post(
+    "/stops/{key}/foxglove",
+    response_model=FoxgloveReceipt,
+    summary="Share the recording of a stop with Foxglove, which begins at the stop",
+    responses=act_responses(FoxgloveReceipt),
+    openapi_extra=described_body(ActBody, FOXGLOVE_FORM.schema, required=False),
+)
+async def share(request: Request, state: CurrentState, key: Key) -> Response:
+    """404 for a stop without a recording, and for one that is too large to be shared."""
+    sent = await sent_act(request, state, ActBody, FOXGLOVE_FORM)
+    stop = await _reader(state).stop(*sort_and_number(key))
+    recording, folder = await _recording(state, stop), state.fleet.recordings_folder
+    if recording is None or folder is None:
+        raise NotFound(say("recording_gone"))
+    if recording.size > BYTES_MOST:
+        raise NotFound(word("recording_large", size=number(f"{recording.size / 1e6:.0f}", "MB")))
+    acts = state.fleet.of_robot(stop.robot).shift_acts
+    asked = sent.asked("foxglove", values={"stop": stop.key, "began": iso_time(stop.at)})
+    act_id = sent.act_id("foxglove") if sent.form else sent.act_id()
+    receipt = await sent.run(acts, asked, act_id)
+    address = ""
+    if receipt.done:
+        shared = state.shared.by_act(act_id)
+        if shared is None:
+            content = await asyncio.to_thread((folder / recording.name).read_bytes)
+            shared = state.shared.share(content, stop.robot, act_id, stop.key, stop.at)
+        address = links_of(shared, str(request.base_url)).address
+    return sent.answer(receipt, f"{state.root}/stops/{key}", recording=address)
 
 
 @router.get(
@@ -351,10 +396,17 @@ async def _recording(state: AppState, stop: Stop) -> "KeptRecording | None":
     return min(kept, key=lambda each: each.since, default=None)
 
 
-async def _shown_recording(state: AppState, stop: Stop) -> ShownRecording | None:
+async def _shown_recording(
+    request: Request, state: AppState, stop: Stop, act: str
+) -> ShownRecording | None:
     if recording := await _recording(state, stop):
         offset = number(f"{stop.at - recording.since:.1f}", "s")
-        return ShownRecording(recording.path, word("recording_at", offset=offset))
+        shared = state.shared.of_stop(stop.key)
+        links = links_of(shared, str(request.base_url)) if shared else None
+        until = word("shared", until=format_time(shared.until)) if shared else ""
+        refused = said_of(act, [session.shift_acts for session in state.fleet.sessions])
+        at = word("recording_at", offset=offset)
+        return ShownRecording(recording.path, at, links, until, refused)
     folder = state.fleet.recordings_folder
     if folder is None or time.time() - stop.at > WRITTEN_S:
         return None
@@ -435,6 +487,7 @@ def story_context(
         parcel=False,
         recording=None,
         curves=None,
+        say=say,
         alarm_word=alarm_word,
         log_word=log_word,
         word=word,
