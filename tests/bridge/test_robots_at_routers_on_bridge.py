@@ -111,9 +111,11 @@ def press(server: Server, word: str) -> dict[str, Any]:
 
 
 def take_control(server: Server) -> None:
-    """The first answer brings the cookie by which a browser has control."""
+    """The first answer brings the cookie by which a browser has control. Waits for the robot's
+    permission, which counts after control."""
     take = f"{server.base}/control/take"
     until(lambda: server.http.post(take, json={}).json()["done"], "control is taken")
+    until(lambda: server.widget("say")["enabled"], "the robot permits it")
 
 
 def shows(server: Server, text: str) -> bool:
