@@ -63,6 +63,7 @@ class Answer:
     """A request on its way. Each method may raise LogError."""
 
     def __init__(self, folder: Path, request: Request, pens: Iterable[KnownPen]) -> None:
+        """`refusal` is why nothing is sent, "" if something is."""
         self.request = request
         self.sent = 0
         self._folder = folder
@@ -90,6 +91,8 @@ class Answer:
             if details:
                 return known, details
             self._next_pen()
+        if not self.sent:  # all were removed since they were counted
+            self.refusal = self.refusal or NOTHING_KEPT
         return None
 
     def done(self, details: Sequence[Detail]) -> None:

@@ -164,6 +164,15 @@ def test_more_than_the_bound_is_refused(cell: CellData, monkeypatch: pytest.Monk
     assert MOST_VALUES > 20 * 15_000, "a day of twenty pens"
 
 
+def test_values_that_go_after_they_were_counted_are_not_done(cell: CellData) -> None:
+    pens = [KnownPen(0, Pen(1, *SPEED))]
+    answer = Answer(cell.folder, Request(1, (), START, START + 600, "ann"), pens)
+    assert answer.refusal == ""
+    (cell.folder / "trends.sqlite3").unlink()
+    assert answer.batch(10) is None
+    assert answer.refusal == "the cell has no values of this time any more"
+
+
 def test_of_a_minute_the_finest_values_are_sent(cell: CellData) -> None:
     cell.trend([5.0] * 120, width=10)
     pens = [KnownPen(0, Pen(1, *SPEED))]
