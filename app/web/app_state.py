@@ -28,6 +28,7 @@ from app.web.metrics import Metrics, PageTrips
 from app.web.pages.page_templates import PageTemplates
 
 if TYPE_CHECKING:
+    from app.cell.commands.machine_acts import MachineRunner
     from app.cell.session.sent_panels import PanelReceiver
     from app.cell.site.wall import Wall
 
@@ -73,6 +74,7 @@ class AppState:
         default_factory=lambda: BoundedDict[tuple[str, str], RefusedForm](FORMS_KEPT)
     )
     user_acts: ActRunner[Access] = field(init=False)
+    machine_acts: "MachineRunner | None" = None  # made at its first use
     confirmer: Confirmer = field(init=False)
 
     def __post_init__(self) -> None:

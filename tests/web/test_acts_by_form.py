@@ -15,6 +15,7 @@ import pytest
 from app.cell.commands.alarm_acts import ALARM_ACTS
 from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.machine_acts import MACHINE_ACTS
 from app.cell.commands.place_acts import PLACE_ACTS
 from app.cell.commands.recipe_acts import RECIPE_ACTS
 from app.cell.commands.shift_acts import SHIFT_ACTS
@@ -147,6 +148,7 @@ ROWS: Final = (
     Row("/users/remove", {"name": "Ito"}, code="users_unknown"),
     Row("/users/token", {"name": "mes", "role": "viewer"}),
     Row("/users/revoke", {"name": "mes"}),
+    Row("/diagnostics/postpone", {"version": "9.9.9", "days": 7}, code="release_gone"),
     Row("/users/end", {"name": "0" * 16}, code="users_session_gone"),
     _edit("create", name="Carton", values=RECIPE),
     _edit("create", "recipe_name_taken", name="Carton", values=RECIPE),
@@ -325,7 +327,7 @@ def test_all_acts_are_here() -> None:
     tables = {
         "control": CONTROL_ACTS,
         "alarms": ALARM_ACTS,
-        "diagnostics": DIAGNOSTIC_ACTS,
+        "diagnostics": {**DIAGNOSTIC_ACTS, **MACHINE_ACTS},
         "users": USER_ACTS,
         "recipes": RECIPE_ACTS,
         "places": PLACE_ACTS,

@@ -10,6 +10,7 @@ from app.cell.alarms.sources import PRIORITIES
 from app.cell.commands.alarm_acts import ALARM_ACTS
 from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.machine_acts import MACHINE_ACTS
 from app.cell.commands.recipe_acts import RECIPE_ACTS
 from app.cell.commands.shift_acts import SHIFT_ACTS
 from app.cell.commands.user_acts import END, SECRET_DONE, USER_ACTS
@@ -47,7 +48,7 @@ TABLES: Final[dict[Kind, tuple[str, ...]]] = {
         *(action for action, *_ in HAND_OVERS.values()),
     ),
     "alarm": (*(f"alarm_{act}" for act in ALARM_ACTS), *(f"alarm_{act}" for act in SHIFT_ACTS)),
-    "diagnostics": tuple(f"diagnostics_{act}" for act in DIAGNOSTIC_ACTS),
+    "diagnostics": tuple(f"diagnostics_{act}" for act in {**DIAGNOSTIC_ACTS, **MACHINE_ACTS}),
     "recipe": tuple(f"recipe_{act}" for act in RECIPE_ACTS),
     "access": (
         *(f"users_{act}" for act in {*USER_ACTS, *CHANGES}),

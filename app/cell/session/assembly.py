@@ -184,8 +184,9 @@ async def _watch_machine(fleet: Fleet, oplog: OperatorLog | NullLog, settings: S
 
     if fleet.machine is None:
         data = settings.data_folder(mode_of(settings, fleet.panel))
-        reader = MachineReader((settings.panel.parent, data), Path(minisign.PINNED))
-        fleet.machine = MachineWatch(oplog, fleet.skews, reader.read)
+        keys = Path(minisign.PINNED)
+        reader = MachineReader(settings.panel.parent, data, keys, fleet.panel.log)
+        fleet.machine = MachineWatch(oplog, fleet.skews, reader)
     await fleet.machine.run()
 
 

@@ -1,30 +1,40 @@
 """What the server sees of the machine that it runs on, for pages, metrics and the operator's log:
-whether the machine's clock follows a time source, how far each robot's clock is from it, and which
-known weaknesses concern what is installed."""
+whether its clock follows a time source and how far each robot's clock is from it, which known
+weaknesses concern what is installed, which newer release is there, and whether the log has room."""
 
 import asyncio
+import json
 import logging
+import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final, Protocol
 
+from app.cell.commands.acts import Finish
 from app.cell.robot.clocks import Skew
 from app.cell.view.clock_status import skew_text
 from app.cell.view.machine_status import (
     Machine,
+    Postponed,
     Weaknesses,
+    release_text,
+    room_text,
     time_remedy,
     time_text,
     weakness_text,
 )
+from app.panel.rules import LogRules
 from app.records.entry import Entry, Kind, new_entry
-from app.system.errors import LogError, SettingsError
+from app.records.room import LogRoom, log_room
+from app.system.errors import LogError, SettingsError, os_error_text
 from app.system.inventory import installed
 from app.system.minisign import SIGNATURE_SUFFIX
-from app.system.texts import TextLike, joined, say
+from app.system.releases import NewRelease, newest_release
+from app.system.texts import Text, TextLike, joined, say
 from app.system.time_source import TimeSource, read_time_source
+from app.system.version import installed_version
 from app.system.vex import read_signed_vex, verdicts
 
 log = logging.getLogger("kiosk.machine")
@@ -35,6 +45,13 @@ MOVED_S: Final = 1.0  # a skew that has changed by less is not logged again
 MOVED_BY: Final = 0.2  # of the logged one
 
 
+class Reader(Protocol):
+    """What reads the machine, and blocks."""
+
+    def read(self) -> Machine: ...
+    def postpone(self, postponed: Postponed) -> None: ...
+
+
 class WatchedLog(Protocol):
     """The operator's log as the watch uses it."""
 
@@ -42,6 +59,9 @@ class WatchedLog(Protocol):
 
 
 VEX: Final = "vex.json"  # beside the panel file, or in the data folder
+UPDATES: Final = "updates"  # the folder of newer releases, beside the panel file
+POSTPONED: Final = "update-notice.json"  # in the data folder
+MOST_FILES: Final = 200
 RELOAD_S: Final = 3600.0  # packages may have been installed meanwhile
 
 Stamp = tuple[object, ...]
@@ -50,15 +70,55 @@ Stamp = tuple[object, ...]
 class MachineReader:
     """Reads what is known of the machine. Used on a thread."""
 
-    def __init__(self, folders: Sequence[Path], keys: Path) -> None:
-        """`folders` may have a VEX file, `keys` are the public keys that it may be signed with."""
-        self._folders = folders
+    def __init__(self, panel: Path, data: Path, keys: Path, rules: LogRules) -> None:
+        """`panel` and `data` are the folders of the panel file and of the data, `keys` the public keys
+        of releases. `rules` are those of the operator's log."""
+        self._folders = panel, data
+        self._data = data
+        self._updates = panel / UPDATES
         self._keys = keys
+        self._rules = rules
         self._weaknesses: tuple[Stamp, float, Weaknesses] | None = None
+        self._release: tuple[Stamp, NewRelease | None] | None = None
 
     def read(self) -> Machine:
         """Blocks for some seconds at most."""
-        return Machine(read_time_source(), self._vex())
+        release = self._newest()
+        return Machine(
+            read_time_source(),
+            self._vex(),
+            release,
+            read_postponed(self._data / POSTPONED) if release is not None else None,
+            self._room(),
+        )
+
+    def postpone(self, postponed: Postponed) -> None:
+        """OSError."""
+        file = self._data / POSTPONED
+        draft = file.with_suffix(".new")
+        draft.write_text(json.dumps(asdict(postponed)), encoding="utf-8")
+        draft.replace(file)
+
+    def _room(self) -> LogRoom | None:
+        if not self._rules.enabled:
+            return None
+        try:
+            return log_room(self._data, self._rules.days, self._rules.size_mb, free_bytes)
+        except (LogError, OSError) as error:
+            log.debug("the room of the operator's log is not known: %s", error)
+            return None
+
+    def _newest(self) -> NewRelease | None:
+        """Its signature is checked again when a file has changed."""
+        try:
+            files = sorted(self._updates.iterdir())[:MOST_FILES]
+        except OSError:
+            return None
+        stamp = tuple(map(_stamp, (*files, self._keys)))
+        if self._release is None or self._release[0] != stamp:
+            newest = newest_release(self._updates, installed_version(), self._keys)
+            self._release = stamp, newest
+        return self._release[1]
 
     def _vex(self) -> Weaknesses | None:
         """Judged again when one of the files has changed, and each hour."""
@@ -84,6 +144,19 @@ def judged(file: Path, keys: Path) -> Weaknesses:
     return Weaknesses(file, affected, investigated)
 
 
+def free_bytes(folder: Path) -> int:
+    return shutil.disk_usage(folder).free
+
+
+def read_postponed(file: Path) -> Postponed | None:
+    """None where nothing is postponed, or the file can't be read."""
+    try:
+        about = json.loads(file.read_bytes())
+        return Postponed(str(about["version"]), float(about["until"]), str(about["by"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 def _stamp(file: Path) -> Stamp:
     try:
         about = file.stat()
@@ -100,34 +173,51 @@ class MachineWatch:
         self,
         operators_log: WatchedLog,
         skews: Callable[[], Mapping[str, Skew | None]],
-        read: Callable[[], Machine],
+        reader: Reader,
     ) -> None:
-        """`skews` returns the skew of each robot's clock, by the robot's id. `read` blocks."""
+        """`skews` returns the skew of each robot's clock, by the robot's id."""
         self.now = Machine()
         self._log = operators_log
         self._skews = skews
-        self._read = read
+        self._reader = reader
         self._logged_time: tuple[object, ...] = ()
         self._logged_skews: dict[str, Skew] = {}
         self._logged_weaknesses: Weaknesses | None = None
+        self._logged_release: NewRelease | None = None
+        self._is_short = False
 
     async def run(self) -> None:
         """Until it is cancelled."""
         looks = 0
         while True:
             if looks % READ_EVERY == 0:
-                self.now = await asyncio.to_thread(self._read)
+                self.now = await asyncio.to_thread(self._reader.read)
             looks += 1
             self.log_changes()
             await asyncio.sleep(LOOK_EVERY_S)
 
+    def postpone(self, postponed: Postponed) -> Finish:
+        """Shows the notice of a newer release later, and keeps that over a restart."""
+        self.now = replace(self.now, postponed=postponed)
+
+        async def finish() -> Text | None:
+            try:
+                await asyncio.to_thread(self._reader.postpone, postponed)
+            except OSError as error:
+                return say("release_not_kept", why=os_error_text(error))
+            return None
+
+        return finish
+
     def log_changes(self) -> None:
         """Writes an entry of the time source if it is another than before, of each robot whose skew is
-        known now, or has moved, and of the weaknesses that a VEX file says. What the log does not take
-        is tried again."""
+        known now, or has moved, of the weaknesses that a VEX file says, of a newer release, and of a
+        room that has become short. What the log does not take is tried again."""
         try:
             self._log_time(self.now.time)
             self._log_weaknesses(self.now.weaknesses)
+            self._log_release(self.now.release)
+            self._log_room(self.now.room)
             for robot, skew in self._skews().items():
                 if skew is not None and _has_moved(self._logged_skews.get(robot), skew):
                     said = say("log_robot_clock", text=skew_text(skew))
@@ -151,6 +241,20 @@ class MachineWatch:
         about = {"file": str(weaknesses.file)} | names
         self._add("diagnostics", weakness_text(weaknesses), about, action="diagnostics_vex")
         self._logged_weaknesses = weaknesses
+
+    def _log_release(self, release: NewRelease | None) -> None:
+        if release is None or release == self._logged_release:
+            return
+        about = {"version": release.version, "file": str(release.file), "signed": release.signed}
+        self._add("diagnostics", release_text(release), about, action="diagnostics_release")
+        self._logged_release = release
+
+    def _log_room(self, room: LogRoom | None) -> None:
+        """Once, while it is short."""
+        is_short = room is not None and room.is_short
+        if room is not None and is_short and not self._is_short:
+            self._add("diagnostics", room_text(room), {}, action="diagnostics_log_room")
+        self._is_short = is_short
 
     def _add(
         self, kind: Kind, reason: TextLike, values: Mapping[str, Any], robot: str = "", action: str = ""

@@ -5,11 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
 
+from app.records.room import LogRoom
+from app.system.clock import format_datetime
+from app.system.releases import NewRelease
 from app.system.texts import Text, TextLike, joined, number, say
 from app.system.time_source import TimeSource
 from app.system.vex import Verdict
 
-State = Literal["ok", "problem", "unknown"]
+State = Literal["ok", "problem", "unknown", "note"]
 NAMED_MOST: Final = 3
 TIME_STATES: Final[Mapping[bool | None, tuple[State, Text]]] = {
     None: ("unknown", say("diagnostics_time_unknown")),
@@ -30,11 +33,30 @@ class Weaknesses:
 
 
 @dataclass(frozen=True, slots=True)
+class Postponed:
+    """The notice of a release that is postponed until a time, in seconds since the epoch."""
+
+    version: str
+    until: float
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
 class Machine:
-    """What was read last. `weaknesses` is None without a VEX file."""
+    """What was read last. `weaknesses` is None without a VEX file, `release` without a newer one, and
+    `room` before the log has a day of entries. `postponed` may be about another release."""
 
     time: TimeSource = field(default_factory=TimeSource)
     weaknesses: Weaknesses | None = None
+    release: NewRelease | None = None
+    postponed: Postponed | None = None
+    room: LogRoom | None = None
+
+    def is_postponed(self, wall: float) -> bool:
+        """Whether the notice of the newer release waits at this time."""
+        about, release = self.postponed, self.release
+        is_same = about is not None and release is not None and about.version == release.version
+        return is_same and about is not None and wall < about.until
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,16 +71,26 @@ class MachineRow:
     reason: TextLike = ""
 
 
-def machine_rows(machine: Machine) -> Iterator[MachineRow]:
+def machine_rows(machine: Machine, wall: float) -> Iterator[MachineRow]:
+    """At `wall`, in seconds since the epoch."""
     yield _time_row(machine.time)
+    if machine.room is not None:
+        yield _room_row(machine.room)
     if machine.weaknesses is not None:
         yield _weakness_row(machine.weaknesses)
+    if machine.release is not None:
+        yield _release_row(machine, machine.release, wall)
 
 
-def machine_notes(machine: Machine) -> Iterator[TextLike]:
+def machine_notes(machine: Machine, wall: float) -> Iterator[TextLike]:
     """What those who maintain the panel are told on every page."""
     if machine.weaknesses is not None and machine.weaknesses.affected:
         yield weakness_text(machine.weaknesses)
+    if machine.room is not None and machine.room.is_short:
+        yield room_text(machine.room)
+    release = machine.release
+    if release is not None and not release.fault and not machine.is_postponed(wall):
+        yield release_text(release)
 
 
 # Its clock.
@@ -122,3 +154,54 @@ def _weakness_row(weaknesses: Weaknesses) -> MachineRow:
         reason = joined((reason, *dict.fromkeys(details), command))
     text = say("diagnostics_vex_unknown") if weaknesses.fault else number(str(count))
     return MachineRow("weaknesses", state, say("diagnostics_vex"), text, about, reason)
+
+
+# A newer release.
+
+
+def release_text(release: NewRelease) -> Text:
+    """That it is there, or why it can't be installed."""
+    if release.fault:
+        return say("release_unusable", version=release.version, why=release.fault)
+    return say("release_there", version=release.version)
+
+
+def _release_row(machine: Machine, release: NewRelease, wall: float) -> MachineRow:
+    title = say("diagnostics_release")
+    if release.fault:
+        return MachineRow("release", "unknown", title, release.version, "", release_text(release))
+    about: TextLike = ""
+    if machine.is_postponed(wall) and machine.postponed is not None:
+        until, by = format_datetime(machine.postponed.until), machine.postponed.by
+        about = say("release_postponed", until=until, by=by)
+    reason = say("release_do", file=str(release.file))
+    return MachineRow("release", "note", title, release.version, about, reason)
+
+
+# The room of the operator's log.
+
+
+def room_text(room: LogRoom) -> Text:
+    """That the room is short, with its figures."""
+    return say(
+        "log_room_short",
+        days=number(f"{room.days:g}"),
+        needed=number(f"{room.needed_mb:,.0f}", "MB"),
+        room=number(f"{room.room_mb:,.0f}", "MB"),
+        kept=number(f"{room.days_kept:,.0f}"),
+        rate=number(f"{room.entries_per_day:,.0f}"),
+    )
+
+
+def _room_row(room: LogRoom) -> MachineRow:
+    reason = joined((room_text(room), say("log_room_do"))) if room.is_short else ""
+    about = say(
+        "log_room_rate",
+        rate=number(f"{room.entries_per_day:,.0f}"),
+        size=number(f"{room.entry_bytes:,.0f}", "B"),
+        kept=number(f"{room.days_kept:,.0f}"),
+    )
+    needed, most = (number(f"{megabytes:,.0f}", "MB") for megabytes in (room.needed_mb, room.room_mb))
+    text = say("log_room_share", needed=needed, room=most)
+    title = say("diagnostics_log_room")
+    return MachineRow("log-room", "problem" if room.is_short else "ok", title, text, about, reason)

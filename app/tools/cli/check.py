@@ -3,9 +3,11 @@
 Exit status, of the worst file: 0 good, 1 faults, 2 unreadable.
 """
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 from app.panel import Panel, check_panel
 from app.system.errors import KioskError, PanelError
@@ -14,6 +16,7 @@ from app.tools.cli.parser import Parser
 
 PROG = "python -m app.check"
 GOOD, FAULTY, UNREADABLE = range(3)
+LOG: Final = "operators-log.sqlite3"  # in the data folder
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -35,11 +38,28 @@ def print_check(path: Path, verbose: bool = False) -> int:
     except PanelError as error:
         print(error, file=sys.stderr, flush=True)
         return UNREADABLE if error.unreadable else FAULTY
-    lines = [_summary(path, result.panel), *map(str, result.notes)]
+    lines = [_summary(path, result.panel), *map(str, result.notes), *_room_notes(path, result.panel)]
     if verbose:
         lines += [line for remark in result.previews for line in str(remark).splitlines()]
     print("\n  ".join(lines), flush=True)
     return GOOD
+
+
+def _room_notes(path: Path, panel: Panel) -> Iterator[str]:
+    """That the operator's log of this machine, if it has one, is short of room for the panel's days."""
+    try:
+        settings = Settings.from_environment({**os.environ, "KIOSK_PANEL": str(path)})
+        folder = settings.data_folder(settings.mode or panel.mode)
+        if not (folder / LOG).exists():
+            return
+    except (KioskError, OSError):
+        return
+    from app.tools.doctor.findings import Report
+    from app.tools.doctor.machine import check_log_room
+
+    report = Report()
+    check_log_room(report, folder, panel)
+    yield from (f"log: {finding.sentence} {finding.do} ({folder})" for finding in report.findings)
 
 
 def _summary(path: Path, panel: Panel) -> str:

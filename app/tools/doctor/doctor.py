@@ -22,6 +22,7 @@ from app.tools.doctor.machine import (
     ReadTime,
     check_data,
     check_fonts,
+    check_log_room,
     check_port,
     check_screens,
     check_time,
@@ -76,6 +77,8 @@ async def diagnose(settings: Settings, options: Options) -> Diagnosis:
     served = check_port(report, options.host, options.port)
     machine = options.machine
     check_data(report, settings.data_folder(mode), panel, served, machine.free_bytes)
+    if panel is not None:
+        check_log_room(report, settings.data_folder(mode), panel, machine.free_bytes)
     check_time(report, machine.read_time)
     languages = panel.readers_languages if panel else (ENGLISH,)
     check_fonts(report, languages, machine.has_font, machine.has_browser)

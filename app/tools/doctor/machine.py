@@ -18,7 +18,8 @@ from app.panel.checks import fit
 from app.panel.model import Panel
 from app.panel.widgets.tiles import KEY_MM, Screen
 from app.records.data_dir import DataDir
-from app.system.errors import FolderInUse, SettingsError
+from app.records.room import log_room
+from app.system.errors import FolderInUse, LogError, SettingsError
 from app.system.process.listen_sockets import check_port_free
 from app.system.time_source import TimeSource, read_time_source
 from app.tools.doctor.findings import Report
@@ -114,6 +115,30 @@ def check_data(
         report.find("data_full", str(folder), free_mb=left, needed_mb=needed)
     if not _in_use(report, folder, served):
         report.fact(f"the data folder {folder} can be written, {left} MB are free")
+
+
+def check_log_room(report: Report, folder: Path, panel: Panel, free: FreeBytes = free_bytes) -> None:
+    """Whether the operator's log has room for its days, at its measured rate. Nothing is said of one
+    that has less than a day of entries, or can't be read."""
+    rules = panel.log
+    try:
+        room = log_room(folder, rules.days, rules.size_mb, free) if rules.enabled else None
+    except (LogError, OSError):
+        return
+    if room is None:
+        return
+    figures = {
+        "room_mb": f"{room.room_mb:.0f}",
+        "needed_mb": f"{room.needed_mb:.0f}",
+        "days": f"{room.days:g}",
+        "rate": f"{room.entries_per_day:.0f}",
+        "kept": f"{room.days_kept:.0f}",
+    }
+    if room.is_short:
+        report.find("log_room", **figures)
+    else:
+        needed = f"{figures['needed_mb']} of {figures['room_mb']} MB for {figures['days']} days"
+        report.fact(f"the operator's log needs {needed} at {figures['rate']} entries a day")
 
 
 def _needed_mb(folder: Path, panel: Panel | None) -> int:

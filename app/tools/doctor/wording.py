@@ -69,6 +69,7 @@ WARNINGS: Final = (
     "bridge_piled_readers",
     "peer_at_routers",
     "robot_elsewhere",
+    "log_room",
     "clock_differs",
     "other_time",
     "topic_no_publisher",

@@ -270,7 +270,7 @@ def _notes(state: AppState, who: Principal) -> Sequence[TextLike]:
         return ()
     from app.cell.view.machine_status import machine_notes
 
-    return [*machine_notes(state.fleet.machine.now)]
+    return [*machine_notes(state.fleet.machine.now, time.time())]
 
 
 def _faded(receipt: Receipt | None) -> Receipt | None:

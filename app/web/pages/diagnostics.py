@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
+from app.cell.commands.machine_acts import MOST_DAYS
 from app.cell.robot.traffic import MAX_COLUMNS, RoundTripSummary
 from app.cell.session.doctor_process import DoctorProcess, FoundFault
 from app.cell.session.looks import Look, NodeRoundTrips, Survey
@@ -229,9 +230,12 @@ class LookQuery(BaseModel):
 
 class DiagnosticActBody(ActBody):
     """The same `id` again is the same act. `at` is when it was touched, in the server's own time.
-    `robot` is the id of one of several robots, whose recording is shared."""
+    `robot` is the id of one of several robots, whose recording is shared. `version` is that of the
+    release whose notice is postponed, for so many `days`."""
 
     robot: Annotated[str, Field(max_length=64)] = ""
+    version: Annotated[str, Field(max_length=64)] = ""
+    days: Annotated[int, Field(ge=1, le=MOST_DAYS)] = 1
 
 
 class RoundTripsAnswer(BaseModel):
@@ -411,12 +415,12 @@ class ForwardAnswer(BaseModel):
 
 
 class MachineAnswer(BaseModel):
-    """What is known of the panel's own PC, by `id`: "time" is its clock, "weaknesses" what
-    a VEX file says. `reason` is what to do, ""
-    for nothing."""
+    """What is known of the panel's own PC, by `id`: "time" is its clock, "log-room" the room of
+    the operator's log, "weaknesses" what a VEX file says, "release" a newer one. `reason` is what to
+    do, "" for nothing."""
 
     id: str
-    state: State
+    state: Literal["ok", "problem", "unknown", "note"]
     text: str
     about: str
     reason: str

@@ -12,6 +12,7 @@ from app.cell.commands.acts import Act
 from app.cell.commands.alarm_acts import ALARM_ACTS
 from app.cell.commands.control_acts import CONTROL_ACTS, HAND_OVERS
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.machine_acts import MACHINE_ACTS
 from app.cell.commands.panel_acts import PANEL_ACTS
 from app.cell.commands.place_acts import PLACE_ACTS
 from app.cell.commands.recipe_acts import RECIPE_ACTS
@@ -26,7 +27,7 @@ from app.system.texts.locales import number_in, time_in
 TABLES: Final[Sequence[tuple[Kind, Mapping[str, Act[Any, Any]]]]] = (
     ("control", CONTROL_ACTS),
     ("alarm", {**ALARM_ACTS, **SHIFT_ACTS}),
-    ("diagnostics", DIAGNOSTIC_ACTS),
+    ("diagnostics", {**DIAGNOSTIC_ACTS, **MACHINE_ACTS}),
     ("recipe", RECIPE_ACTS),
     ("place", PLACE_ACTS),
     ("panel", PANEL_ACTS),
@@ -38,6 +39,8 @@ ACTION_WORDS: Final = {
     "panel_kept": "log_page_panel_kept",
     "panel_restored": "log_page_panel_restored",
     "diagnostics_vex": "diagnostics_vex",
+    "diagnostics_release": "diagnostics_release",
+    "diagnostics_log_room": "diagnostics_log_room",
 }
 OUTCOME_WORDS: Final = {
     "published": "log_outcome_published",

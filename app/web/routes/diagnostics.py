@@ -12,7 +12,9 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, Response
 
+from app.cell.commands.acts import ActContext, ActRunner
 from app.cell.commands.diagnostic_acts import DIAGNOSTIC_ACTS
+from app.cell.commands.machine_acts import MACHINE_ACTS, MachineRunner
 from app.cell.commands.press import PRESS_ID
 from app.cell.robot.traffic import RoundTripSummary
 from app.cell.session.alarm_mqtt import AlarmMqtt
@@ -31,6 +33,8 @@ from app.cell.view.diagnostics import (
 )
 from app.cell.view.link_status import LinkStatus
 from app.cell.view.machine_status import MachineRow, machine_rows
+from app.panel.roles import ENGINEER
+from app.records.press_record import PressLog
 from app.ros.graph.model import SurveyedTopic, topic_forwarding
 from app.ros.messages.names import Qos
 from app.system.clock import iso_time
@@ -114,10 +118,20 @@ def mqtt_json(mqtt: AlarmMqtt) -> dict[str, Any] | None:
     }
 
 
+def machine_runner(state: AppState) -> MachineRunner:
+    """Made with the first act: no page needs it."""
+    if state.machine_acts is None:
+        context = ActContext(state.fleet.first.press_guard, PressLog(state.log), "", lambda: None)
+        state.machine_acts = ActRunner(
+            "diagnostics", MACHINE_ACTS, lambda: state.fleet.machine, context
+        )
+    return state.machine_acts
+
+
 def rows_of_machine(state: AppState) -> list[MachineRow]:
     """None on a wall, and in the first seconds."""
     watch = state.fleet.machine
-    return [*machine_rows(watch.now)] if watch is not None else []
+    return [*machine_rows(watch.now, time.time())] if watch is not None else []
 
 
 def machine_json(state: AppState) -> list[dict[str, Any]]:
@@ -214,8 +228,16 @@ def look_json(look: Look) -> dict[str, Any]:
 
 router = APIRouter()
 
-DiagnosticAct = Annotated[str, Path(json_schema_extra={"enum": list(DIAGNOSTIC_ACTS)})]
-ACT_FORM: Final = FormFields({"id": {"pattern": PRESS_ID}, "page": {}, "robot": {"maxLength": 64}})
+DiagnosticAct = Annotated[str, Path(json_schema_extra={"enum": [*DIAGNOSTIC_ACTS, *MACHINE_ACTS]})]
+ACT_FORM: Final = FormFields(
+    {
+        "id": {"pattern": PRESS_ID},
+        "page": {},
+        "robot": {"maxLength": 64},
+        "version": {"maxLength": 64},
+        "days": {"pattern": "^[0-9]{1,2}$"},
+    }
+)
 DEPTH: Final = 10  # of the bridge's reader for a look: two messages a second are shown
 ZIP: Final = "application/zip"
 
@@ -257,7 +279,7 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
 
 @router.post(
     "/diagnostics/{act}",
-    summary="Begin a check by the doctor, get the support bundle, or share a recording with Foxglove",
+    summary="A check by the doctor, the support bundle, a shared recording, or a postponed notice",
     responses=act_responses(DiagnosticReceipt)
     | {
         200: {
@@ -265,7 +287,7 @@ async def look(request: Request, state: CurrentState, query: Annotated[LookQuery
                 JSON: {"schema": DiagnosticReceipt.model_json_schema()},
                 ZIP: {"schema": {"type": "string", "format": "binary"}},
             },
-            "description": "of `check` and `foxglove` the receipt, of `bundle` the zip",
+            "description": "the receipt, of `bundle` the zip",
         },
         503: {"description": "the operator's log can't be written, or the bundle not be made"},
     },
@@ -279,7 +301,11 @@ async def act(act: DiagnosticAct, request: Request, state: CurrentState) -> Resp
     if act == "foxglove" and recorder is None:
         raise NotFound(say("recording_off"))
     act_id = sent.act_id(act) if sent.form else sent.act_id()
-    receipt = await sent.run(session.diagnostic_acts, sent.asked(act), act_id)
+    if act in MACHINE_ACTS:
+        asked = sent.asked(act, sent.body.version, {"days": sent.body.days})
+        receipt = await sent.run(machine_runner(state), asked, act_id)
+    else:
+        receipt = await sent.run(session.diagnostic_acts, sent.asked(act), act_id)
     if receipt.done and act == "bundle":
         return sent.with_cookie(await _bundle(state))
     address = ""
@@ -312,11 +338,12 @@ async def _page(
     name = "_diagnostics.html" if query.part else "diagnostics.html"
     page = FramedPage(name, word("title"), f"/diagnostics?{again}", "diagnostics", query.robot)
     more = {
-        "act_refused": said_of(query.act, [state.fleet.first.diagnostic_acts]),
+        "act_refused": said_of(query.act, [state.fleet.first.diagnostic_acts, machine_runner(state)]),
         "mqtt": state.fleet.alarms.mqtt,
         "forward": state.fleet.forward.status if state.fleet.forward else None,
         "shared": _shared(request, state, query.robot),
         "machine_rows": rows_of_machine(state),
+        "may_postpone": caller_of(request).principal.meets(ENGINEER),
         "sent_panel": await _sent_panel(state),
     }
     return framed_page(request, state, page, {**context, **TEXTS, **more})

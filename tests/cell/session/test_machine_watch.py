@@ -5,7 +5,7 @@ from typing import Any
 
 from app.cell.robot.clocks import Skew
 from app.cell.session.machine_watch import MachineWatch
-from app.cell.view.machine_status import Machine
+from app.cell.view.machine_status import Machine, Postponed
 from app.records.entry import Entry
 from app.system.errors import LogError
 from app.system.texts import Text, text_in
@@ -30,11 +30,21 @@ class Log:
         return rows
 
 
+class Unread:
+    """A reader that is not asked."""
+
+    def read(self) -> Machine:
+        raise AssertionError
+
+    def postpone(self, postponed: Postponed) -> None:
+        raise AssertionError
+
+
 class Watched:
     def __init__(self) -> None:
         self.log = Log()
         self.skews: dict[str, Skew | None] = {}
-        self.watch = MachineWatch(self.log, lambda: self.skews, Machine)
+        self.watch = MachineWatch(self.log, lambda: self.skews, Unread())
 
     def look(self, time: TimeSource | None = None) -> list[tuple[str, dict[str, Any]]]:
         if time is not None:

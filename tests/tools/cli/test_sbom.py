@@ -1,4 +1,4 @@
-"""`operator-panel sbom` and `--check`, with signatures by the real minisign."""
+"""`operator-panel sbom` and `--check`."""
 
 import json
 from importlib.metadata import version
@@ -8,10 +8,8 @@ from typing import Any
 import pytest
 
 from app.tools.cli.command import main
+from tests.support.signed import Signer
 from tests.system.test_vex import document, product, statement
-from tests.tools.install.test_minisign import Signer
-
-pytestmark = pytest.mark.usefixtures("minisign")
 
 FASTAPI = f"pkg:pypi/fastapi@{version('fastapi')}"
 

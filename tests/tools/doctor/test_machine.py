@@ -3,6 +3,7 @@
 import json
 import os
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from functools import partial
@@ -25,6 +26,7 @@ from app.tools.doctor.machine import (
     displays,
     has_font,
 )
+from tests.records.test_room import fill
 from tests.support.browser.fonts import fonts_file
 from tests.support.parts import ROOT, Server, free_port
 from tests.tools.doctor.setups import Setup, named, panel_of, readout
@@ -253,6 +255,36 @@ def test_the_clock_follows_a_time_source_or_that_is_a_note(
     assert report.is_well
     fact = "this machine's clock is synchronised by chrony"
     assert (fact in report.facts) is (source.synchronised is True)
+
+
+@pytest.mark.parametrize(("days", "expected"), [(365, []), (36_500, ["log_room"])])
+def test_a_log_that_needs_more_room_than_it_has_is_found_with_its_figures(
+    setup: Setup, days: int, expected: list[str]
+) -> None:
+    setup.data.mkdir()
+    fill(setup.data, time.time() - 8 * 86_400, 1600)
+    rules = f'mode = "demo"\n[log]\ndays = {days}\nsize_mb = 64\n'
+    report = setup.diagnose(panel_of(more=rules), NO_ROUTER).report
+    assert [code for code in report.codes() if code != "demo_mode"] == expected
+    facts = [fact for fact in report.facts if "at 200 entries a day" in fact]
+    assert len(facts) == 1 - len(expected)
+    for finding in report.findings[: len(expected)]:
+        assert (finding.details["rate"], finding.details["room_mb"]) == ("200", "64")
+        assert finding.severity == "warning"
+
+
+def test_check_tells_it_of_the_log_of_this_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("KIOSK_DATA", str(tmp_path / "data"))
+    (tmp_path / "data").mkdir()
+    file = tmp_path / "cell.toml"
+    file.write_text(panel_of(more='mode = "demo"\n[log]\ndays = 36500\nsize_mb = 64\n'))
+    assert main(["check", str(file)]) == 0
+    assert "entries a day" not in capsys.readouterr().out
+    fill(tmp_path / "data", time.time() - 8 * 86_400, 1600)
+    assert main(["check", str(file)]) == 0
+    assert "log: The operator's log has 64 MB for 36500 days" in capsys.readouterr().out
 
 
 @pytest.fixture
