@@ -154,7 +154,7 @@ class PageContext(TypedDict):
     frame_keys: Sequence[FrameKey]
     good_outcomes: Collection[str]
     wall_now: Mapping[str, Any]
-    notes: Sequence[TextLike]
+    machine_notes: Sequence[TextLike]
 
 
 def page_context(
@@ -214,7 +214,7 @@ def page_context(
         frame_keys=[*frame_keys(panel, session.entry.id if session.entry else None, page.id)],
         good_outcomes=GOOD_OUTCOMES,
         wall_now=_wall_now(state),
-        notes=_notes(state, who),
+        machine_notes=_machine_notes(state, who),
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
@@ -264,7 +264,7 @@ def _wall_now(state: AppState) -> Mapping[str, Any]:
     return header_of(state.wall)
 
 
-def _notes(state: AppState, who: Principal) -> Sequence[TextLike]:
+def _machine_notes(state: AppState, who: Principal) -> Sequence[TextLike]:
     """What those who maintain the panel are told of its PC. Imported only where it is watched."""
     if state.fleet.machine is None or not who.meets(MAINTENANCE):
         return ()
