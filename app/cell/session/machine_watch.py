@@ -184,20 +184,24 @@ class MachineWatch:
         self._logged_skews: dict[str, Skew] = {}
         self._logged_weaknesses: Weaknesses | None = None
         self._logged_release: NewRelease | None = None
-        self._is_short = False
+        self._postponed: Postponed | None = None  # since the start
+        self._is_room_logged = False
 
     async def run(self) -> None:
         """Until it is cancelled."""
         looks = 0
         while True:
             if looks % READ_EVERY == 0:
-                self.now = await asyncio.to_thread(self._reader.read)
+                machine = await asyncio.to_thread(self._reader.read)
+                # What was postponed while it was read may not be on the disk yet.
+                self.now = replace(machine, postponed=self._postponed or machine.postponed)
             looks += 1
             self.log_changes()
             await asyncio.sleep(LOOK_EVERY_S)
 
     def postpone(self, postponed: Postponed) -> Finish:
         """Shows the notice of a newer release later, and keeps that over a restart."""
+        self._postponed = postponed
         self.now = replace(self.now, postponed=postponed)
 
         async def finish() -> Text | None:
@@ -250,11 +254,10 @@ class MachineWatch:
         self._logged_release = release
 
     def _log_room(self, room: LogRoom | None) -> None:
-        """Once, while it is short."""
-        is_short = room is not None and room.is_short
-        if room is not None and is_short and not self._is_short:
+        """Once of each start."""
+        if room is not None and room.is_short and not self._is_room_logged:
             self._add("diagnostics", room_text(room), {}, action="diagnostics_log_room")
-        self._is_short = is_short
+            self._is_room_logged = True
 
     def _add(
         self, kind: Kind, reason: TextLike, values: Mapping[str, Any], robot: str = "", action: str = ""
