@@ -308,6 +308,7 @@ class MachineState(Display):
 
 BREAK: Final = r"^([01][0-9]|2[0-3]):[0-5][0-9]-([01][0-9]|2[0-3]):[0-5][0-9]$"
 Break = Annotated[str, Field(pattern=BREAK)]
+Percent = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 MAX_REASONS: Final = 6
 MAX_COUNTERS: Final = 3
 
@@ -332,8 +333,8 @@ class OeeCounter(TopicField):
 class OeeRules(NeedsKey):
     """Asks for the reason of a stop of at least `reason_after_s`, and has what the figures of a shift
     are computed from. `running` are the values of `[state]` with which the machine produces; by default
-    those of the shape "play". `breaks` are times of day that are not planned to be worked. `needs` is
-    the role or group that answers."""
+    those of the shape "play". `breaks` are times of day that are not planned to be worked. The targets
+    are in percent, `target` is that of the OEE. `needs` is the role or group that answers."""
 
     reason_after_s: Seconds = 120.0
     reasons: Annotated[tuple[OeeReason, ...], Field(strict=False, max_length=MAX_REASONS)] = Field(
@@ -342,6 +343,10 @@ class OeeRules(NeedsKey):
     running: Annotated[tuple[StateValue, ...] | None, Field(strict=False)] = None
     breaks: Annotated[tuple[Break, ...], Field(strict=False, max_length=12)] = ()
     ideal_cycle_s: Seconds | None = None
+    target: Percent | None = None
+    target_availability: Percent | None = None
+    target_performance: Percent | None = None
+    target_quality: Percent | None = None
     counters: Annotated[tuple[OeeCounter, ...], Field(strict=False, max_length=MAX_COUNTERS)] = Field(
         (), alias="counter"
     )

@@ -1,6 +1,7 @@
 """Counters since the start, and round trips from browsers to the server. `app/web/prometheus.py`
 exports the counters."""
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from app.system.limits import BoundedDict
 
 if TYPE_CHECKING:
     from app.cell.site.wall import Wall
+    from app.cell.stops.oee import ShiftFigures
 
 
 @dataclass(slots=True)
@@ -59,6 +61,8 @@ class Metrics:
         self.wall = wall
         self.presses: dict[str, Count] = {}  # by outcome
         self.streams = Open()
+        self.shift: dict[str, ShiftFigures] = {}  # by the robot's id; read when they are asked for
+        self.shift_at = -math.inf  # when, in seconds since the epoch
 
     def pressed(self, outcome: str) -> None:
         """The outcome of a press or a hold."""

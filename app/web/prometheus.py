@@ -1,10 +1,10 @@
 """The counts in Prometheus's text format, gathered when it asks."""
 
 import time
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from prometheus_client.core import (
@@ -20,12 +20,21 @@ from app.cell.permission.robot_options import options_now
 from app.cell.session.alarm_mqtt import AlarmMqtt
 from app.cell.session.alarms import Alarms
 from app.cell.session.fleet import Fleet
+from app.cell.stops.oee import NOT_ANSWERED, SHORT, ShiftFigures
 from app.cell.view.machine_status import Machine
+from app.panel.rules import OeeRules
 from app.web.metrics import Metrics
 
 if TYPE_CHECKING:
     from app.cell.forward.status import ForwardStatus
     from app.cell.site.wall import Wall
+
+SHIFT_FIGURES: Final = {
+    "availability": "Availability of the shift",
+    "performance": "Performance of the shift",
+    "quality": "Quality of the shift",
+    "oee": "Overall equipment effectiveness of the shift",
+}
 
 
 def exposition(metrics: Metrics) -> tuple[bytes, str]:
@@ -62,6 +71,8 @@ class _Of(Collector):
                 yield from _of_machine(metrics.fleet.machine.now)
             if metrics.fleet.alarms.mqtt.address:
                 yield from _of_mqtt(metrics.fleet.alarms.mqtt)
+            if (rules := metrics.fleet.panel.oee) is not None:
+                yield from _of_shift(metrics.shift, rules)
             if metrics.fleet.forward is not None:
                 yield from _of_forward(metrics.fleet.forward.status)
         if metrics.wall is not None:
@@ -144,6 +155,28 @@ def _of_mqtt(mqtt: AlarmMqtt) -> Iterator[Metric]:
     yield CounterMetricFamily(
         "kiosk_alarms_mqtt_dropped", "Transitions that found no room", value=mqtt.dropped
     )
+
+
+def _of_shift(shift: Mapping[str, ShiftFigures], rules: OeeRules) -> Iterator[Metric]:
+    """The figures of the shift up to now; what is not known is left out. Reasons that the panel file no
+    longer has count as "?"."""
+    figures = {
+        name: GaugeMetricFamily(f"kiosk_shift_{name}", f"{about}, 0 to 1", labels=["robot"])
+        for name, about in SHIFT_FIGURES.items()
+    }
+    about = 'Down time by reason; "" is not answered, "-" a short stop'
+    stopped = GaugeMetricFamily("kiosk_shift_stop_seconds", about, labels=["robot", "reason"])
+    known = {NOT_ANSWERED, SHORT, *(reason.id for reason in rules.reasons)}
+    for robot, of_robot in shift.items():
+        for name, family in figures.items():
+            if (value := getattr(of_robot, name)) is not None:
+                family.add_metric([robot], value)
+        seconds: defaultdict[str, float] = defaultdict(float)
+        for row in of_robot.reasons:
+            seconds[row.reason if row.reason in known else "?"] += row.seconds
+        for reason in sorted(known | seconds.keys()):
+            stopped.add_metric([robot, reason], seconds[reason])
+    yield from (*figures.values(), stopped)
 
 
 def _of_forward(status: "ForwardStatus") -> Iterator[Metric]:

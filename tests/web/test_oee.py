@@ -30,6 +30,8 @@ states = [
 [oee]
 reason_after_s = 1.0
 ideal_cycle_s = 0.2
+target = 75
+target_quality = 99.5
 counter = [
   { parts = "all", topic = "/parts", type = "std_msgs/msg/UInt32" },
   { parts = "bad", topic = "/rejects", type = "std_msgs/msg/UInt32" },
@@ -102,6 +104,31 @@ def test_the_figures_are_of_what_was_recorded(cell: Server) -> None:
     assert told["not_recorded_s"] > 0
 
 
+def test_targets_are_marked(cell: Server) -> None:
+    assert figures(cell)["targets"] == {
+        "availability": None,
+        "performance": None,
+        "quality": 0.995,
+        "oee": 0.75,
+    }
+    page = cell.http.get("/oee", headers={"accept-language": "ja"}).text
+    assert "<span>目標\u00a075</span>" in page or "<span>目標 75</span>" in page
+    assert page.count('<line x1="99.5"') == 1
+
+
+def test_prometheus_has_the_figures_of_the_shift(cell: Server) -> None:
+    told, text = figures(cell), cell.http.get("/metrics").text
+    values = dict(re.findall(r"^(kiosk_shift_\S+) (\S+)$", text, re.MULTILINE))
+    assert 0 < float(values['kiosk_shift_availability{robot=""}']) < 1
+    assert float(values['kiosk_shift_oee{robot=""}']) > 0
+    names = {
+        f'kiosk_shift_stop_seconds{{reason="{r}",robot=""}}' for r in ("", "-", "material", "break")
+    }
+    assert names <= values.keys()
+    stopped = sum(float(values[name]) for name in names)
+    assert 0 < stopped <= told["actual_unit_down_time_s"] + 0.01
+
+
 def test_the_line_of_alarms_asks_after_the_restart(cell: Server) -> None:
     line = re.compile(r'class="asked" role="status"><b data-text="text">Stood still for [^<]+<')
     until(lambda: line.search(cell.http.get("/").text), "the panel asks", within_s=20)
@@ -157,6 +184,27 @@ def test_what_is_no_reason_is_refused(cell: Server) -> None:
     receipt = give(cell, ended(cell)[0]["key"], "luck")
     assert (receipt["outcome"], receipt["code"]) == ("refused", "oee_reason_unknown")
     assert give(cell, "state-999999", "material")["status"] == 404
+
+
+def test_open_reasons_are_asked_together_before_the_shift_ends(tmp_path: Path) -> None:
+    def line() -> dict[str, Any]:
+        return server.snapshot()["alarms"]["asked"] or {"began": []}
+
+    with demo_server(tmp_path, PANEL, app="tests.support.apps.shift_end:app") as server:
+        until(lambda: ended(server), "the machine has stood still", within_s=20)
+        first = ended(server)[0]["key"]
+        assert give(server, first, "")["outcome"] == "succeeded"
+        until(lambda: len(line()["began"]) > 1, "it is asked together", within_s=60)
+        location = server.http.get("/stops/asked").headers["location"]
+        assert location == "/oee?shift=this&open=1"
+        page = server.http.get(location).text
+        listed = re.findall(r'class="answer" href="/stops/([a-z0-9-]+)#reasons"', page)
+        assert first in listed
+        before = len(line()["began"])
+        assert give(server, first, "material")["outcome"] == "succeeded"
+        until(lambda: len(line()["began"]) < before, "one less is asked")
+        page = server.http.get(location).text
+        assert f'class="answer" href="/stops/{first}#reasons"' not in page
 
 
 def test_who_may_not_answer_is_told_why(tmp_path: Path) -> None:

@@ -441,11 +441,11 @@ class PriorityCount(TypedDict):
 
 
 class AskedReason(TypedDict):
-    """The question why a robot stood still from `since` (seconds since the epoch) on: `text` says for
-    how long, `times` from when to when."""
+    """The question why a robot stood still from each time of `began` (seconds since the epoch) on.
+    Of one stop `text` says for how long, `times` from when to when."""
 
     robot: str
-    since: float
+    began: list[float]
     text: TextLike
     times: TextLike
 

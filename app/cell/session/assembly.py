@@ -114,7 +114,7 @@ async def open_fleet(
         trends = _trend_disk(settings, panel, fleet)
         fleet.states = settings.data_folder(mode_of(settings, panel)) / STATES
         site = _site_summary(settings, panel, fleet)
-        states = _state_recorder(fleet, fleet.states, panel)
+        states = _state_recorder(fleet, oplog, fleet.states, panel)
         fleet.forward = _forward(settings, panel)
         machine = keep_running(
             partial(_watch_machine, fleet, oplog, settings), log, "the machine is not watched"
@@ -164,15 +164,18 @@ async def open_fleet(
                 await asyncio.to_thread(recordings.stop)
 
 
-def _state_recorder(fleet: Fleet, path: Path, panel: Panel) -> StateRecorder | None:
+def _state_recorder(
+    fleet: Fleet, oplog: OperatorLog | NullLog, path: Path, panel: Panel
+) -> StateRecorder | None:
     """What records the states of a panel that has them; with `[oee]` it asks for reasons."""
     if panel.state is None:
         return None
     if panel.oee is None:
         return StateRecorder(path, fleet.sessions)
-    from app.cell.session.stops import ask_reason
+    from app.cell.session.stops import ask_open_reasons, ask_reason
 
-    return StateRecorder(path, fleet.sessions, partial(ask_reason, fleet))
+    asks_together = partial(ask_open_reasons, fleet, oplog) if panel.oee.reasons else None
+    return StateRecorder(path, fleet.sessions, partial(ask_reason, fleet), asks_together)
 
 
 async def _watch_machine(fleet: Fleet, oplog: OperatorLog | NullLog, settings: Settings) -> None:

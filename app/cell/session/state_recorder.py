@@ -6,18 +6,25 @@ import json
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from app.cell.alarms.report import NOT_RECORDED, CountRow, StateRow, close_states, write_states
+from app.cell.alarms.report import (
+    NOT_RECORDED,
+    CountRow,
+    StateRow,
+    close_states,
+    shift_at,
+    write_states,
+)
 from app.cell.session.session import RobotSession
 from app.cell.view.displays import field_state
 from app.panel.rules import STATE_ID, OeeCounter
 from app.panel.values import same_value
 from app.system.concurrency import keep_running
-from app.system.errors import LogError
+from app.system.errors import LogError, TooMany
 from app.system.texts import Text
 
 log = logging.getLogger("kiosk.alarms")
@@ -25,11 +32,14 @@ log = logging.getLogger("kiosk.alarms")
 LOOK_EVERY_S: Final = 0.5  # a state that is shorter is left out
 ALIVE_EVERY_S: Final = 30.0
 COUNT_EVERY_S: Final = 60.0
+ASK_BEFORE_END_S: Final = 900.0  # of a shift that its open reasons are asked
 MAX_WAITING: Final = 1_000  # rows that the disk has refused; the oldest go
 
 
 # Called with the robot's id and from when to when it stood still, as it runs again.
 OnRestart = Callable[[str, float, float], None]
+# Called with the time, some time before the end of each shift.
+OnShiftEnd = Callable[[float], Awaitable[None]]
 
 
 class StateRecorder:
@@ -41,9 +51,12 @@ class StateRecorder:
         path: Path,
         sessions: Sequence[RobotSession],
         on_restart: OnRestart = lambda *_: None,
+        on_shift_end: OnShiftEnd | None = None,
     ) -> None:
         self._path = path
         self._on_restart = on_restart
+        self._on_shift_end = on_shift_end
+        self._asks_at = math.inf
         self._stood_since: dict[str, float] = {}
         self._counted_at: dict[str, float] = {}
         self._counts: list[CountRow] = []
@@ -68,6 +81,7 @@ class StateRecorder:
 
     async def _run(self) -> None:
         self._states.clear()
+        self._asks_at = self._next_end(time.time())
         # What is counted while nothing was recorded does not count.
         self._counts += [
             CountRow(time.time(), robot)
@@ -82,7 +96,21 @@ class StateRecorder:
             self._look(now := time.time())
             if self._waiting or self._counts or abs(now - self._alive_at) >= ALIVE_EVERY_S:
                 await self._write(now)
+            if self._on_shift_end is not None and now >= self._asks_at:
+                await self._ask(self._on_shift_end, now)
             await asyncio.sleep(LOOK_EVERY_S)
+
+    def _next_end(self, now: float) -> float:
+        """When the reasons of the shift at this time are asked."""
+        starts = next(iter(self._sessions.values())).panel.alarm_rules.shifts
+        return shift_at(now, starts).until - ASK_BEFORE_END_S
+
+    async def _ask(self, ask: OnShiftEnd, now: float) -> None:
+        self._asks_at = self._next_end(now + ASK_BEFORE_END_S)
+        try:
+            await ask(now)
+        except (LogError, TooMany) as error:
+            log.error("the reasons of stops were not asked at the end of the shift: %s", error)
 
     def _look(self, now: float) -> None:
         for robot, session in self._sessions.items():

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from app.cell.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow, history_rows, reading
-from app.cell.alarms.report import CountRow, read_counts, read_states
+from app.cell.alarms.report import CountRow, read_counts, read_states, shift_at
 from app.cell.alarms.shown import AskedReason
 from app.cell.commands.shift_acts import REASON_ACTION
 from app.cell.session.fleet import Fleet
 from app.cell.stops.changes import Change, ChangeFilter, read_changes
 from app.cell.stops.oee import (
+    SAME_S,
     Answer,
     AnsweredStop,
     Plan,
@@ -49,7 +50,7 @@ from app.panel.model import Panel
 from app.records import Filter, LogRow, NullLog, OperatorLog
 from app.system.clock import format_time
 from app.system.errors import NotFound
-from app.system.texts import say
+from app.system.texts import number, say
 
 MOST_STOPS: Final = 200
 KEY_S: Final = 2.0  # a state is recorded so much later than its change at most
@@ -274,7 +275,34 @@ def ask_reason(fleet: Fleet, robot: str, since: float, until: float) -> None:
         return
     text = say("oee_stood_still", duration=duration_text(float(round(until - since))))
     times = say("oee_from_to", since=format_time(since), until=format_time(until))
-    fleet.alarms.ask(AskedReason(robot=robot, since=since, text=text, times=times))
+    fleet.alarms.ask(AskedReason(robot=robot, began=[since], text=text, times=times))
+
+
+async def ask_open_reasons(fleet: Fleet, log: OperatorLog | NullLog, now: float) -> None:
+    """Asks before the end of a shift for the reasons of its stops that have none, as those that were
+    left for later: of one robot, the first that has some. LogError and TooMany as of `figures_of`."""
+    shift = shift_at(now, fleet.panel.alarm_rules.shifts)
+    for session in fleet.sessions:
+        robot = session.entry.id if session.entry else ""
+        figures = await figures_of(fleet, log, robot, shift.since, now)
+        if began := [stop.stop.standstill.since for stop in figures.open]:
+            fleet.alarms.ask(_asked_together(robot, began))
+            return
+
+
+def _asked_together(robot: str, began: list[float]) -> AskedReason:
+    text, times = say("oee_open_count", count=number(str(len(began)))), say("oee_before_end")
+    return AskedReason(robot=robot, began=began, text=text, times=times)
+
+
+def reason_given(fleet: Fleet, robot: str, since: float) -> None:
+    """The reason of a stop was given, or left for later: it is not asked any more."""
+    question = fleet.alarms.asked
+    if question is None or question["robot"] != robot:
+        return
+    began = [each for each in question["began"] if abs(each - since) > SAME_S]
+    if len(began) < len(question["began"]):
+        fleet.alarms.ask(_asked_together(robot, began) if began else None)
 
 
 async def figures_of(

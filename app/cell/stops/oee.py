@@ -25,6 +25,7 @@ COUNT_GAP_S: Final = 150.0  # counters are recorded each minute: what is further
 NOT_ANSWERED: Final = ""  # in place of a reason's id
 SHORT: Final = "-"  # stops of which no reason is asked
 LONGEST_STOPS: Final = 10
+MOST_OPEN: Final = 20  # stops without a reason that are asked together
 
 
 class Span(NamedTuple):
@@ -157,6 +158,19 @@ class ShiftFigures:
     @property
     def longest(self) -> tuple[StopTime, ...]:
         return tuple(sorted(self.stops, key=lambda stop: -stop.seconds)[:LONGEST_STOPS])
+
+    @property
+    def open(self) -> tuple[StopTime, ...]:
+        """The newest stops that are over and have no reason, in their order."""
+        without = (
+            stop
+            for stop in self.stops
+            if stop.stop.standstill.is_over
+            and stop.stop.key
+            and stop.stop.reason == NOT_ANSWERED
+            and not stop.is_short
+        )
+        return tuple(without)[-MOST_OPEN:]
 
 
 # Spans of time.

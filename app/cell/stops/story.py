@@ -117,7 +117,8 @@ class Line:
 class Story:
     """`first` is the first cause; None where it can't be told, and `why` says why. `tied` are then
     those that were first together. `by_stamps`: all that was compared has stamps of the robot.
-    `is_complete`: all that changed is in `lines`; else those nearest the stop are."""
+    `is_complete`: all that changed is in `lines`; else those nearest the stop are. `effects` are ids
+    of what only follows from a stop."""
 
     stop: Stop
     lines: tuple[Line, ...]
@@ -126,6 +127,7 @@ class Story:
     tied: tuple[Event, ...] = ()
     by_stamps: bool = False
     is_complete: bool = True
+    effects: frozenset[str] = frozenset()
 
     @property
     def zero(self) -> float:
@@ -150,11 +152,13 @@ class Story:
 
     @property
     def following(self) -> Event | None:
-        """What followed from the first cause; None where nothing is known to."""
+        """What followed from the first cause, beside what follows from each stop; None where nothing is
+        known to."""
         first = self.first
         if first is None:
             return None
-        later = (line.event for line in self.lines if line.event.breaks and line.event.id != first.id)
+        known = {first.id, *self.effects}
+        later = (line.event for line in self.lines if line.event.breaks and line.event.id not in known)
         return next((event for event in later if event.begun > first.begun), None)
 
     def span_text(self, seconds: float) -> TextLike:
@@ -233,6 +237,7 @@ def story_of(
         () if first else tied,
         by_stamps and bool(chain),
         are_complete and len(ordered) <= MOST_EVENTS,
+        frozenset(effects),
     )
 
 

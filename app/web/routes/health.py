@@ -1,15 +1,20 @@
 """For monitoring: `/healthz`, `/readyz` and `/metrics`."""
 
 import asyncio
+import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from pydantic import BaseModel
 
+from app.cell.alarms.report import shift_at
+from app.cell.session.fleet import Fleet
+from app.system.errors import LogError, TooMany
 from app.system.texts import render
-from app.web.app_state import CurrentState
+from app.web.app_state import AppState, CurrentState
 from app.web.caller import caller_of
 from app.web.metrics import Metrics
 from app.web.requests import errors
@@ -18,6 +23,8 @@ if TYPE_CHECKING:
     from app.cell.site.wall import Wall
 
 router = APIRouter()
+
+SHIFT_EVERY_S: Final = 30.0  # at most the figures of the shift are read
 
 
 @router.get("/healthz", summary="200 while the process serves", responses=errors(403))
@@ -74,8 +81,26 @@ def _of_wall(request: Request, wall: "Wall") -> Response:
 )
 async def metrics(state: CurrentState) -> Response:
     exposition = await asyncio.to_thread(_exposition)
+    fleet = state.metrics.fleet
+    if fleet is not None and fleet.panel.oee is not None:
+        await _read_shift(state, fleet)
     text, media_type = exposition(state.metrics)
     return Response(text, media_type=media_type)
+
+
+async def _read_shift(state: AppState, fleet: Fleet) -> None:
+    """Reads the figures of the shift, at most each half minute; none where they can't be read."""
+    from app.cell.session.stops import figures_of
+
+    metrics, now = state.metrics, time.time()
+    if abs(now - metrics.shift_at) < SHIFT_EVERY_S:
+        return
+    metrics.shift_at, metrics.shift = now, {}
+    since = shift_at(now, fleet.panel.alarm_rules.shifts).since
+    for session in fleet.sessions:
+        robot = session.entry.id if session.entry else ""
+        with suppress(LogError, TooMany):
+            metrics.shift[robot] = await figures_of(fleet, state.log, robot, since, now)
 
 
 def _exposition() -> Callable[[Metrics], tuple[bytes, str]]:

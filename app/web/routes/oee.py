@@ -33,22 +33,26 @@ MINUTE_S: Final = 60.0
 
 
 class OeeQuery(BaseModel):
-    """`robot` is the one whose figures are shown, by default the first."""
+    """`robot` is the one whose figures are shown, by default the first. With `open` the page lists the
+    stops whose reason is not known, else the longest."""
 
     model_config = ConfigDict(extra="forbid")
 
     shift: Literal["this", "last", "previous"] = "this"
     robot: Annotated[str, Field(max_length=64)] = ""
+    open: Literal["", "1"] = ""
 
 
 class Figure(NamedTuple):
     """A figure in percent, "" where it is not known; `beside` says what it is made of, and `bar` is its
-    length in percent."""
+    length in percent. `target` is "" and `mark` None without a target."""
 
     name: TextLike
     value: TextLike
     beside: TextLike
     bar: float
+    target: TextLike = ""
+    mark: float | None = None
 
 
 class ShownBand(NamedTuple):
@@ -95,7 +99,9 @@ class OeeContext(TypedDict):
     marks: list[TextLike]
     summed: TextLike
     reasons: list[ShownReason]
-    longest: list[ShownStop]
+    table: TextLike
+    has_open: bool
+    listed: list[ShownStop]
     notes: list[TextLike]
     alarm_word: Any
     word: Any
@@ -127,6 +133,15 @@ class ReasonAnswer(BaseModel):
     share: float
 
 
+class TargetsAnswer(BaseModel):
+    """The targets of the panel file, from 0 to 1; null without one."""
+
+    availability: float | None
+    performance: float | None
+    quality: float | None
+    oee: float | None
+
+
 class OeeAnswer(BaseModel):
     """The figures of a shift up to now, with the names of ISO 22400-2; null is not known. Times in
     seconds."""
@@ -145,6 +160,7 @@ class OeeAnswer(BaseModel):
     performance: float | None
     quality: float | None
     oee: float | None
+    targets: TargetsAnswer
     reasons: list[ReasonAnswer]
     stops: list[StopAnswer]
 
@@ -236,7 +252,7 @@ def oee_context(
         ],
         robots={str(robot.id): robot.name for robot in panel.robots},
         span=span_text(shift),
-        index=Figure(word("index"), _percent(figures.oee), _good(figures), 0.0),
+        index=_figure("index", figures.oee, _good(figures), rules.target),
         parts=list(_parts(figures, rules)),
         bands=[
             ShownBand(
@@ -249,7 +265,9 @@ def oee_context(
         marks=[clock_text(figures.since + n * whole / MARKS) for n in range(MARKS + 1)],
         summed=word("sum", minutes=down, count=count) if figures.stops else "",
         reasons=list(_reasons(figures.reasons, rules)),
-        longest=[_shown(stop, rules) for stop in figures.longest],
+        table=word("open" if form.open else "longest"),
+        has_open=bool(figures.open),
+        listed=[_shown(stop, rules) for stop in (figures.open if form.open else figures.longest)],
         notes=list(_notes(figures)),
         alarm_word=alarm_word,
         word=word,
@@ -272,25 +290,29 @@ def _good(figures: ShiftFigures) -> TextLike:
     return "" if figures.good is None else word("good", count=_quantity(figures.good))
 
 
+def _figure(name: str, share: float | None, beside: TextLike, target: float | None) -> Figure:
+    bar = min(100.0, 100 * (share or 0.0))
+    if target is None:
+        return Figure(word(name), _percent(share), beside, bar)
+    said = word("target", target=number(f"{target:g}"))
+    return Figure(word(name), _percent(share), beside, bar, said, target)
+
+
 def _parts(figures: ShiftFigures, rules: OeeRules) -> Iterator[Figure]:
     """Availability, performance and quality, with what each is made of."""
-
-    def figure(name: str, share: float | None, beside: TextLike) -> Figure:
-        return Figure(word(name), _percent(share), beside, min(100.0, 100 * (share or 0.0)))
-
     times = word("of_minutes", part=_minutes(figures.running_s), whole=_minutes(figures.busy_s))
-    yield figure("availability", figures.availability, times)
+    yield _figure("availability", figures.availability, times, rules.target_availability)
     cycle: TextLike = ""
     if figures.performance and rules.ideal_cycle_s is not None:
         actual = rules.ideal_cycle_s / figures.performance
         ideal = number(f"{rules.ideal_cycle_s:.1f}")
         cycle = word("cycle", cycle=number(f"{actual:.1f}"), ideal=ideal)
-    yield figure("performance", figures.performance, cycle)
+    yield _figure("performance", figures.performance, cycle, rules.target_performance)
     rejected: TextLike = ""
     if figures.quality is not None and figures.produced is not None and figures.good is not None:
         bad = _quantity(figures.produced - figures.good)
         rejected = word("rejected", count=bad, whole=_quantity(figures.produced))
-    yield figure("quality", figures.quality, rejected)
+    yield _figure("quality", figures.quality, rejected, rules.target_quality)
 
 
 def _label(reason: str, rules: OeeRules) -> TextLike:
@@ -357,6 +379,15 @@ def figures_json(rules: OeeRules, figures: ShiftFigures) -> dict[str, Any]:
         "performance": figures.performance,
         "quality": figures.quality,
         "oee": figures.oee,
+        "targets": {
+            name: None if target is None else target / 100
+            for name, target in (
+                ("availability", rules.target_availability),
+                ("performance", rules.target_performance),
+                ("quality", rules.target_quality),
+                ("oee", rules.target),
+            )
+        },
         "reasons": [{**row._asdict(), "text": _label(row.reason, rules)} for row in figures.reasons],
         "stops": [_stop_json(rules, stop) for stop in figures.stops],
     }

@@ -7,16 +7,17 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_args
+from urllib.parse import quote
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.cell.alarms.shown import panel_id
+from app.cell.alarms.report import shift_at
+from app.cell.alarms.shown import AskedReason, panel_id
 from app.cell.commands.acts import ActRequest
 from app.cell.commands.press import PRESS_ID
-from app.cell.session.stops import StopReader, stores_of
-from app.cell.stops.oee import SAME_S
+from app.cell.session.stops import StopReader, reason_given, stores_of
 from app.cell.stops.sources import PanelNames
 from app.cell.stops.story import MOST_EVENTS, Event, Line, Stop, StopSort, Story
 from app.cell.view.times import duration_text
@@ -38,6 +39,7 @@ from app.web.pages.log_words import day_name, who_of
 from app.web.pages.log_words import word as log_word
 from app.web.pages.story_curves import StoryCurves, story_curves
 from app.web.requests import SINCE, TEXT, FormFields, described_body, errors
+from app.web.routes.alarm_report import SHIFTS
 
 if TYPE_CHECKING:
     from app.cell.history.kept import KeptRecording
@@ -250,10 +252,21 @@ async def of_alarm(state: CurrentState, query: Annotated[AlarmQuery, Query()]) -
 async def asked(state: CurrentState) -> Response:
     question = state.fleet.alarms.asked
     key = ""
+    if question is not None and len(question["began"]) > 1:
+        return RedirectResponse(f"{state.root}{_list_of(state, question)}", status_code=303)
     if question is not None:
-        key = await _reader(state).key_at(question["robot"], question["since"])
+        key = await _reader(state).key_at(question["robot"], question["began"][0])
     path = f"/stops/{key}#reasons" if key else "/stops"
     return RedirectResponse(f"{state.root}{path}", status_code=303)
+
+
+def _list_of(state: AppState, question: AskedReason) -> str:
+    """The page with the stops of a shift that have no reason."""
+    now, starts = time.time(), state.fleet.panel.alarm_rules.shifts
+    until = question["began"][-1]
+    shift = next((name for n, name in enumerate(SHIFTS) if shift_at(now, starts, n).since <= until), "")
+    robot = f"&robot={quote(question['robot'])}" if question["robot"] else ""
+    return f"/oee?shift={shift or SHIFTS[-1]}{robot}&open=1"
 
 
 @router.post(
@@ -275,9 +288,8 @@ async def give_reason(request: Request, state: CurrentState, key: Key) -> Respon
     asked = sent.asked("reason" if reason else "later", stood.key, values)
     session = state.fleet.of_robot(stop.robot)
     receipt = await sent.run(session.shift_acts, asked, sent.act_id(reason or "later"))
-    question = state.fleet.alarms.asked
-    if receipt.done and question and abs(question["since"] - stood.standstill.since) <= SAME_S:
-        state.fleet.alarms.ask(None)
+    if receipt.done:
+        reason_given(state.fleet, stop.robot, stood.standstill.since)
     answer = sent.answer(receipt, f"{state.root}/stops/{key}")
     if "location" in answer.headers:
         answer.headers["location"] += "#reasons"
@@ -497,7 +509,7 @@ def story_context(
 
 def _shown(line: Line, story: Story) -> ShownLine:
     event = line.event
-    beside = [part for part in (event.detail, who_of(event.by) if event.by else "") if part]
+    beside = [part for part in (who_of(event.by) if event.by else "", event.detail) if part]
     change: TextLike = ""
     if event.before and event.after:
         change = say("story_change", before=event.before, after=event.after)

@@ -207,6 +207,15 @@ def test_times_have_no_more_digits_than_the_clocks_agree_on() -> None:
     assert str(arrived.span_text(0.3)) == "0.3 s"
 
 
+def test_what_follows_from_each_stop_is_not_named_in_the_sentence() -> None:
+    events = [event(-1.0, sent=-1.2), event(-0.9, name="no_fault", sent=-1.199)]
+    assert story_of(stop(sent=AT), events, {"no_fault"}).following is None
+    events.append(event(-0.8, name="drives", sent=-1.18))
+    following = story_of(stop(sent=AT), events, {"no_fault"}).following
+    assert following is not None
+    assert following.id == "drives"
+
+
 def test_a_flood_is_cut_and_counted() -> None:
     flood = [
         event(-BEFORE_S + 1 + n * 1e-3, "press", f"p{n}", breaks=False) for n in range(MOST_EVENTS + 7)
