@@ -7,6 +7,8 @@ says so.
 """
 
 import math
+from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
@@ -201,7 +203,10 @@ def story_of(
     stop, as the panel file says. If the events are not complete, what was first can't be told."""
     known = list(_as_their_values(events))
     by_stamps = (stop.sent is not None or stop.sort != "state") and all(
-        event.sent is not None for event in _possible(stop, known, _by_value(known), effects)
+        event.sent is not None
+        for event in _possible(
+            stop, known, _Values(sorted(known, key=lambda each: each.begun)), effects
+        )
     )
     if not by_stamps:
         stop = stop._replace(sent=None)
@@ -209,7 +214,7 @@ def story_of(
     begun = stop.begun
     within = [e for e in known if begun - BEFORE_S <= e.begun <= begun + AFTER_S]
     ordered = sorted(within, key=lambda event: event.begun)
-    values = _by_value(ordered)
+    values = _Values(ordered)
     chain = causes(stop, ordered, values, effects)
     tied = _first_together(chain)
     first = _named_best(tied) if tied else None
@@ -245,21 +250,24 @@ def _as_their_values(events: Iterable[Event]) -> Iterator[Event]:
     """The events, of which alarms have the times of the interlock or condition that changed by the same
     message: alarms have no stamps, and are raised some time after its arrival."""
     every = list(events)
-    changes = [event for event in every if event.sort in CYCLIC and event.breaks]
+    changes: defaultdict[Source, list[Event]] = defaultdict(list)
     for event in every:
-        same = (
-            change
-            for change in changes
-            if event.sort == "alarm"
-            and event.breaks
-            and event.sources & change.sources
-            and -SAME_ARRIVAL_S <= event.at - event.began_s - change.at <= LATE_ALARM_S
-        )
-        change = next(same, None)
+        if event.sort in CYCLIC and event.breaks:
+            for source in event.sources:
+                changes[source].append(event)
+    for event in every:
+        change = _change_of(event, changes) if event.sort == "alarm" and event.breaks else None
         if change is None:
             yield event
         else:
             yield event._replace(at=change.at, sent=change.sent, clock=change.clock, began_s=0.0)
+
+
+def _change_of(alarm: Event, changes: Mapping[Source, Sequence[Event]]) -> Event | None:
+    """The change of an interlock or condition by the message that raised an alarm."""
+    of_sources = (change for source in alarm.sources for change in changes.get(source, ()))
+    begun = alarm.at - alarm.began_s
+    return next((c for c in of_sources if -SAME_ARRIVAL_S <= begun - c.at <= LATE_ALARM_S), None)
 
 
 def _cut_before(stop: Stop, ordered: Sequence[Event]) -> Why | None:
@@ -272,19 +280,55 @@ def _cut_before(stop: Stop, ordered: Sequence[Event]) -> Why | None:
     return "cut" if is_cut else None
 
 
-Values = Mapping[tuple[Sort, str], Sequence[Event]]
+Phase = tuple[float, float]
 
 
-def _by_value(ordered: Iterable[Event]) -> Values:
+class _Values:
     """The events by their sort and id; states together, as one ends another."""
-    values: dict[tuple[Sort, str], list[Event]] = {}
+
+    def __init__(self, ordered: Iterable[Event]) -> None:
+        self._events: defaultdict[tuple[Sort, str], list[Event]] = defaultdict(list)
+        self._heals: defaultdict[tuple[Sort, str], list[float]] = defaultdict(list)
+        self._phases: dict[tuple[Sort, str], list[Phase]] = {}
+        for event in ordered:
+            name = (event.sort, "" if event.sort == "state" else event.id)
+            self._events[name].append(event)
+            if event.heals:
+                self._heals[name].append(event.begun)
+
+    def is_well_between(self, sort: Sort, name: str, since: float, until: float) -> bool:
+        """Whether it was well again between two times."""
+        heals = self._heals.get((sort, name), [])
+        number = bisect_right(heals, since)
+        return number < len(heals) and heals[number] < until
+
+    def phases(self, event: Event) -> list[Phase]:
+        """From when to when its condition was not met, up to the phase of this event; infinity for one
+        that has not ended. What is shorter apart than a contact bounces is one."""
+        name = event.sort, event.id
+        if name not in self._phases:
+            self._phases[name] = list(_phases(self._events[name]))
+        phases = self._phases[name]
+        return phases[: bisect_right(phases, (event.begun, math.inf))]
+
+
+def _phases(ordered: Iterable[Event]) -> Iterator[Phase]:
+    begun, end = -math.inf, -math.inf
     for event in ordered:
-        values.setdefault((event.sort, "" if event.sort == "state" else event.id), []).append(event)
-    return values
+        if event.breaks and event.begun - begun > BOUNCE_S:
+            if begun > -math.inf:
+                yield begun, end
+            begun, end = event.begun, math.inf
+        elif event.breaks:
+            end = math.inf
+        elif event.heals and end == math.inf:
+            end = event.begun
+    if begun > -math.inf:
+        yield begun, end
 
 
 def _possible(
-    stop: Stop, events: Iterable[Event], values: Values, effects: Collection[str]
+    stop: Stop, events: Iterable[Event], values: _Values, effects: Collection[str]
 ) -> list[Event]:
     """The events that may have caused a stop: what breaks, and still stands at the stop."""
     return [
@@ -300,7 +344,7 @@ def _possible(
 
 
 def causes(
-    stop: Stop, ordered: Sequence[Event], values: Values, effects: Collection[str]
+    stop: Stop, ordered: Sequence[Event], values: _Values, effects: Collection[str]
 ) -> tuple[Event, ...]:
     """The events that may have caused a stop, from the first on: what the panel names and what broke,
     still stands at the stop, and is not separated from it by a longer time."""
@@ -327,42 +371,26 @@ def _is_stop_itself(event: Event, stop: Stop) -> bool:
     return event.sort in ("state", "goal")
 
 
-def _is_over(event: Event, values: Values, stop: Stop) -> bool:
+def _is_over(event: Event, values: _Values, stop: Stop) -> bool:
     """Whether it was well again some time before the stop; or was a press, after which the machine went
     on."""
-    is_press = event.sort == "press"
-    of_value = values.get(("state", "") if is_press else (event.sort, event.id), ())
-    until = stop.begun if is_press else stop.begun - RETURNED_S
-    return any(other.heals and event.begun < other.begun < until for other in of_value)
+    if event.sort == "press":
+        return values.is_well_between("state", "", event.begun, stop.begun)
+    return values.is_well_between(event.sort, event.id, event.begun, stop.begun - RETURNED_S)
 
 
 # What comes in each cycle.
 
 
-def _phases(event: Event, values: Values) -> list[tuple[float, float]]:
-    """From when to when its condition was not met, up to this event; infinity for one that has not
-    ended. What is shorter apart than a contact bounces is one."""
-    phases: list[tuple[float, float]] = []
-    for other in values[event.sort, event.id]:
-        if other.breaks and other.begun <= event.begun:
-            if phases and other.begun - phases[-1][0] <= BOUNCE_S:
-                phases[-1] = phases[-1][0], math.inf
-            else:
-                phases.append((other.begun, math.inf))
-        elif other.heals and phases and phases[-1][1] == math.inf:
-            phases[-1] = phases[-1][0], other.begun
-    return phases
-
-
-def _is_routine(event: Event, values: Values) -> bool:
+def _is_routine(event: Event, values: _Values) -> bool:
     """Whether a condition was not met again and again before the stop."""
-    return event.sort in CYCLIC and len(_phases(event, values)) >= ROUTINE
+    return event.sort in CYCLIC and len(values.phases(event)) >= ROUTINE
 
 
-def _is_usual(event: Event, values: Values, until: float) -> bool:
+def _is_usual(event: Event, values: _Values, until: float) -> bool:
     """Whether a condition that comes in each cycle was not met for as long as usual, until another
     cause or the stop. If it was for longer, it may be the cause."""
-    *earlier, (begun, end) = _phases(event, values)
+    *earlier, (begun, end) = values.phases(event)
     longest = max((end - begun for begun, end in earlier if end < math.inf), default=0.0)
     return min(end, until) - begun <= longest
 
