@@ -24,6 +24,7 @@ SHORT_EVENTS: Final = 10  # that the page shows first
 
 GAP_S: Final = 10.0  # a longer time without a cause separates what happened before from the stop
 RETURNED_S: Final = 2.0  # what was well again so long before the stop is no cause
+USUAL: Final = 1.5  # times as long a phase of the cycle may be that is over
 BOUNCE_S: Final = 1.0  # changes to and fro within this time are one
 ROUTINE: Final = 3  # a condition that was not met so often before the stop is part of the cycle
 SAME_STAMP_S: Final = 0.001  # two stamps of one clock that differ by less are not ordered
@@ -389,10 +390,11 @@ def _is_routine(event: Event, values: _Values) -> bool:
 
 def _is_usual(event: Event, values: _Values, until: float) -> bool:
     """Whether a condition that comes in each cycle was not met for as long as usual, until another
-    cause or the stop. If it was for longer, it may be the cause."""
+    cause or the stop. If it was for longer, it may be the cause; what was met again in the meantime may
+    have been for a little longer, as no two cycles are equal."""
     *earlier, (begun, end) = values.phases(event)
     longest = max((end - begun for begun, end in earlier if end < math.inf), default=0.0)
-    return min(end, until) - begun <= longest
+    return min(end, until) - begun <= (longest if end > until else USUAL * longest)
 
 
 def _first_together(chain: Sequence[Event]) -> tuple[Event, ...]:

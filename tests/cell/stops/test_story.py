@@ -135,6 +135,19 @@ STOPS: dict[str, tuple[list[Event], str]] = {
         ],
         "drives",
     ),
+    "a box that was missing a little longer in the last cycle": (
+        [
+            *(
+                e
+                for at in (-40, -30, -20)
+                for e in (event(at, "condition", "box"), well(at + 1.1, "condition", "box"))
+            ),
+            event(-2.5, "condition", "box"),
+            well(-1.3, "condition", "box"),
+            event(-0.5),
+        ],
+        "guard",
+    ),
     "the link was cut right before": (
         [
             event(-7.0, "link", "", sources=frozenset({("link", "")})),
