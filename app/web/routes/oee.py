@@ -102,7 +102,7 @@ class OeeContext(TypedDict):
     table: TextLike
     has_open: bool
     listed: list[ShownStop]
-    notes: list[TextLike]
+    lacks: list[TextLike]
     alarm_word: Any
     word: Any
 
@@ -268,7 +268,7 @@ def oee_context(
         table=word("open" if form.open else "longest"),
         has_open=bool(figures.open),
         listed=[_shown(stop, rules) for stop in (figures.open if form.open else figures.longest)],
-        notes=list(_notes(figures)),
+        lacks=list(_lacks(figures)),
         alarm_word=alarm_word,
         word=word,
     )
@@ -349,7 +349,7 @@ def _shown(stop: StopTime, rules: OeeRules) -> ShownStop:
     )
 
 
-def _notes(figures: ShiftFigures) -> Iterator[TextLike]:
+def _lacks(figures: ShiftFigures) -> Iterator[TextLike]:
     """What the figures lack."""
     if not (figures.running_s or figures.down_s or figures.planned_s):
         yield word("no_record")
