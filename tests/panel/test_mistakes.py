@@ -281,6 +281,8 @@ def shows_at(number: int) -> set[int]:
     header = header_of(number)
     if LINES[number - 1].startswith("states = [{"):  # of a source: a lamp lacks them
         return {header, header_of(LINES.index('id = "level_lamp"') + 1)}
+    if LINES[number - 1].startswith("counter = [{"):  # a cycle needs parts
+        return {header, LINES.index("ideal_cycle_s = 12.0") + 1}
     elsewhere = SHOWS_AT.get(LINES[number - 1])
     if LINES[number - 1].startswith("durability"):  # a topic has one QoS: another place has another
         tables = {n for n, line in enumerate(LINES, 1) if line == "[page.widget.qos]"}
