@@ -264,11 +264,13 @@ def _add_log(parcel: ParcelFile, folder: Path, moment: Moment, language: str) ->
         return
     wanted = Filter(since=round(moment.since * 1000), until=round(moment.until * 1000), every=True)
     with parcel.attempt(*names):
-        entries = _entries(folder, wanted)
-        if len(entries) == MOST_ENTRIES:
-            parcel.notes.append(f"The log had more entries: it has the newest {MOST_ENTRIES}.")
-        lines = "".join(f"{as_line(row.entry)}\n" for row in entries)
-        parcel.add(names[0], "the operator's log, an entry a line, with the chain of hashes", lines)
+        every = _entries(folder, wanted)
+        lines = _newest(as_line(row.entry) for row in every)
+        entries = every[: len(lines)][::-1]
+        if len(lines) < len(every) or len(every) >= MOST_ENTRIES:
+            parcel.notes.append(f"The log had more entries: it has the newest {len(lines)}.")
+        text = "".join(f"{line}\n" for line in lines)
+        parcel.add(names[0], "the operator's log, an entry a line, with the chain of hashes", text)
         csv = _cut(log_export(folder, wanted, None, language=language))
         parcel.add(names[1], "the same as a table", csv)
         if entries:
@@ -276,7 +278,7 @@ def _add_log(parcel: ParcelFile, folder: Path, moment: Moment, language: str) ->
 
 
 def _entries(folder: Path, wanted: Filter) -> list[LogRow]:
-    """The oldest first."""
+    """The newest first."""
     entries: list[LogRow] = []
     while len(entries) < MOST_ENTRIES:
         before = entries[-1].entry.seq if entries else None
@@ -284,7 +286,19 @@ def _entries(folder: Path, wanted: Filter) -> list[LogRow]:
         entries += more
         if len(more) < ROWS_AT_ONCE:
             break
-    return entries[::-1]
+    return entries
+
+
+def _newest(lines: Iterable[str]) -> list[str]:
+    """Of lines, the newest first, as many as a part may have, the oldest first."""
+    kept: list[str] = []
+    size = 0
+    for line in lines:
+        size += len(line.encode()) + 2
+        if size > MOST_TEXT:
+            break
+        kept.append(line)
+    return kept[::-1]
 
 
 def _chain(entries: list[LogRow]) -> str:
@@ -321,11 +335,14 @@ def _add_alarms(parcel: ParcelFile, folder: Path, moment: Moment, language: str)
     wanted = HistoryFilter(since=moment.since, until=moment.until)
     with parcel.attempt(*names):
         history = read_alarms(path, wanted=wanted, most=MOST_ENTRIES)
-        details = [
-            {**row._asdict(), "at": iso_time(row.at), "record": json.loads(row.record)}
-            for row in reversed(history)
-        ]
-        parcel.add_json(names[0], "what happened to alarms, with all details", details)
+        details = _newest(
+            json.dumps({**row._asdict(), "at": iso_time(row.at), "record": json.loads(row.record)})
+            for row in history
+        )
+        if len(details) < len(history) or len(history) >= MOST_ENTRIES:
+            parcel.notes.append(f"There was more of alarms: it has the newest {len(details)}.")
+        text = ",\n".join(details)
+        parcel.add(names[0], "what happened to alarms, with all details", f"[{text}]\n")
         csv = _cut(alarm_export.export(path, wanted, False, language))
         parcel.add(names[1], "the same as a table", csv)
 

@@ -294,6 +294,26 @@ def test_hostile_recordings_are_left_out(cell: Cell, tmp_path: Path) -> None:
     assert "A recording was still being written" in readme(parts)
 
 
+def test_of_a_long_log_and_many_alarms_the_newest_are_kept(
+    cell: Cell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def made() -> dict[str, bytes]:
+        file = tmp_path / "fault.zip"
+        assert main(cell.command(file, "--at", cell.at.isoformat(), "--force")) == 0
+        return parts_of(file.read_bytes())
+
+    whole = made()
+    lines = whole["log.jsonl"].splitlines()
+    monkeypatch.setattr("app.tools.doctor.parcel.MOST_TEXT", len(whole["log.jsonl"]) - 100)
+    cut = made()
+    assert cut["log.jsonl"].splitlines() == lines[1:]
+    assert f"The log had more entries: it has the newest {len(lines) - 1}." in readme(cut)
+    monkeypatch.setattr("app.tools.doctor.parcel.MOST_TEXT", len(whole["alarms.json"]) - 100)
+    alarms, fewer = json.loads(whole["alarms.json"]), json.loads(made()["alarms.json"])
+    assert fewer == alarms[-len(fewer) :]
+    assert len(fewer) < len(alarms)
+
+
 def test_too_many_recordings_are_named(
     cell: Cell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
