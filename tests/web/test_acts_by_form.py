@@ -284,7 +284,7 @@ def sent_by(
     entries = [
         {column: _timeless(entry[column]) for column in COMPARED}
         for entry in log_rows(log)[before:]
-        if entry["action"] not in BY_TIME
+        if entry["action"] not in BY_TIME and entry["kind"] != "clock"
     ]
     return answers, entries
 
