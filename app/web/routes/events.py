@@ -60,9 +60,15 @@ async def events(
             everything = publisher.snapshot(current(), shown) + first + beat(language)
         answer = Response(everything, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        renewed = partial(getattr, asks, "signed_in_since")
-        answer = EventStream(publisher, first, state.metrics.streams, shown, current, renewed)
+        is_other_user = partial(_is_other_user, asks, asks.session is not None)
+        answer = EventStream(publisher, first, state.metrics.streams, shown, current, is_other_user)
     return asks.with_client_cookie(answer, token)
+
+
+def _is_other_user(asks: Caller, had_session: bool) -> bool:
+    """Whether the user of the browser is another one than when its stream began, or no one: its page
+    is told by the end of the stream, and asks who it is."""
+    return asks.signed_in_since or (had_session and asks.session is None)
 
 
 def _audience_now(
@@ -106,7 +112,8 @@ class EventStream(Response):
     ) -> None:
         """`first` is sent with the snapshot; `streams` counts the open streams; `page` is the page
         whose widgets it sends, "" for all; `audience` returns that of the client now. It ends when it
-        `is_outdated`: the browser opens another one, with the cookie of its new session."""
+        `is_outdated`, after what has changed with that: the browser opens another one, with the cookie
+        of its new session."""
         self._publisher = publisher
         self._first = first
         self._streams = streams
@@ -139,8 +146,7 @@ class EventStream(Response):
         await send(_body(self._beginning(audience)))
         while not publisher.closed:
             await publisher.wait_for_change(version, beats)
-            if publisher.version > version and self._is_outdated():
-                break
+            is_over = publisher.version > version and self._is_outdated()
             chunk = b""
             if publisher.version > version:
                 before, audience = audience, self._audience()
@@ -151,6 +157,8 @@ class EventStream(Response):
                 beats = heartbeat.count
             if chunk:
                 await send(_body(chunk))
+            if is_over:
+                break
         await send({"type": "http.response.body", "body": b"", "more_body": False})
 
     def _beginning(self, audience: Audience) -> bytes:
