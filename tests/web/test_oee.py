@@ -114,6 +114,7 @@ def test_targets_are_marked(cell: Server) -> None:
     page = cell.http.get("/oee", headers={"accept-language": "ja"}).text
     assert "<span>目標\u00a075</span>" in page or "<span>目標 75</span>" in page
     assert page.count('<line x1="99.5"') == 1
+    assert page.count('class="around"') == 1
 
 
 def test_prometheus_has_the_figures_of_the_shift(cell: Server) -> None:
