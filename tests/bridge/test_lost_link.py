@@ -1,11 +1,14 @@
 """A bridge, or the router of nodes on rmw_zenoh, is killed while a hold, a trend, a camera, a recording
 and the alarms of a list run, and started again."""
 
+import re
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import pytest
+from mcap.reader import make_reader
 
 from app.tools.simulator.known_types import grey_pixels, png
 from tests.bridge.test_cameras_on_bridge import PACKED, ask, looking
@@ -16,6 +19,7 @@ from tests.support.holds import PATIENT, TOPIC, permit
 from tests.support.parts import Bridge, RosNode, Server, live, publish_until, until
 from tests.support.rmw import RmwNode, Router
 from tests.web.test_hold_socket import held
+from tests.web.test_stops import story
 
 pytestmark = pytest.mark.promise("hold")
 
@@ -39,6 +43,12 @@ kind = "camera"
 label = "Eye"
 topic = "/eye"
 type = "{PACKED}"
+"""
+STATE: Final = """
+[state]
+topic = "/mode"
+type = "std_msgs/msg/String"
+states = [{ value = "RUN", text = "Run", shape = "play" }]
 """
 ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
 FAULTS: Final = f"""
@@ -123,6 +133,31 @@ def test_a_lost_link_ends_a_hold_and_the_rest_goes_on_after_it(
     until(lambda: files(tmp_path), "the recording is finished")
     by_topic = records(files(tmp_path)[0])
     assert {"/speed", "/web_ui/presses"} <= by_topic.keys()
+
+
+def test_the_story_of_a_lost_link_leads_to_its_recording(
+    way: Way, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    panel.write_text(JOG + MORE + STATE + record(1))
+    kiosk = servers(live(way.link.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    for topic, type_name in (("/operation_enabled", "std_msgs/msg/Bool"), ("/speed", SPEED)):
+        way.node.advertise(topic, type_name)
+    way.node.every("/speed", {"data": 1.5}, 0.1)
+    permit(kiosk, way.node, True)
+    until(lambda: readings(kiosk) > 0, "the trend has values")
+    way.link.kill()
+
+    def told() -> dict[str, Any] | None:
+        keys = re.findall(r'href="/stops/(link-[0-9]+)"', kiosk.http.get("/stops").text)
+        stories = (story(kiosk, key) for key in keys)
+        return next((each for each in stories if each["recording"]), None)
+
+    lost = dict(until(told, "the lost link is recorded", within_s=60))
+    assert lost["stop"]["sort"] == "link"
+    content = kiosk.http.get(lost["recording"]["path"]).content
+    topics = {channel.topic for _, channel, _ in make_reader(BytesIO(content)).iter_messages()}
+    assert "/speed" in topics
 
 
 def test_an_alarm_that_ends_during_a_cut_is_ended_by_the_next_list(

@@ -398,14 +398,13 @@ def _reader(state: AppState) -> StopReader:
 
 
 async def _recording(state: AppState, stop: Stop) -> "KeptRecording | None":
-    """That which has the most of what was before the stop; None without one."""
+    """None without one."""
     folder = state.fleet.recordings_folder
     if folder is None:
         return None
-    from app.cell.history.kept import recordings_of  # imports MCAP
+    from app.cell.history.kept import recording_of  # imports MCAP
 
-    kept = await asyncio.to_thread(recordings_of, folder, stop.robot, stop.at, stop.at)
-    return min(kept, key=lambda each: each.since, default=None)
+    return await asyncio.to_thread(recording_of, folder, stop.robot, stop.at)
 
 
 async def _shown_recording(
