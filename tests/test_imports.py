@@ -39,10 +39,10 @@ FOLDERS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "tools": (
         ("cell_config", "doctor", "install", "kiosk", "simulator"),
-        ("prove",),
         ("scaffold",),
         ("robot",),
         ("editor",),
+        ("prove",),
         ("central",),
         ("cli",),
     ),

@@ -1,6 +1,7 @@
 """Arguments that several commands have, and the data folder that they name."""
 
 import os
+import sys
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -10,7 +11,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.ros.dialects.dialect import DOMAIN_MOST
+from app.system.errors import SettingsError, os_error_text
 from app.system.settings import Settings
+from app.system.texts import render
 from app.tools.cli.parser import Parser
 
 # Arguments that several commands have: types whose mistake is one sentence, and the settings.
@@ -52,6 +55,37 @@ def environment(options: Any) -> dict[str, str]:
         if value is not None:
             variables[variable] = ",".join(value) if isinstance(value, list) else str(value)
     return variables
+
+
+TOKEN: Final = "OPERATOR_PANEL_TOKEN"
+
+
+def add_kiosk(parser: Parser) -> None:
+    """--token-file, --trust: of a kiosk that is asked over HTTP."""
+    add = parser.add_argument
+    add("--token-file", type=Path, metavar="FILE", help="a file with the token; - is standard input")
+    add(
+        "--trust",
+        default="",
+        metavar="FILE",
+        help="the certificate authority of the kiosk, or the SHA-256 of its certificate; default: the"
+        " system's authorities",
+    )
+
+
+def kiosk_token(options: Any) -> str | None:
+    """The token of --token-file or of the environment; None without one. SettingsError if it can't be
+    read."""
+    if options.token_file is None:
+        return os.environ.get(TOKEN) or None
+    try:
+        text: str = (
+            sys.stdin.readline() if str(options.token_file) == "-" else options.token_file.read_text()
+        )
+    except (OSError, UnicodeDecodeError) as error:
+        why = os_error_text(error) if isinstance(error, OSError) else "it is not text"
+        raise SettingsError(f"the token can't be read: {render(why)}") from error
+    return text.strip()
 
 
 def ros_domain(text: str) -> int:

@@ -1,7 +1,7 @@
 """`operator-panel prove [PANEL]`: whether each control is locked when it has to be, on the simulated
-robot.
+robot; with `--live` on a real one, with a person who watches.
 
-Exit status: 0 every case holds, 1 some do not, 2 the panel can't be used.
+Exit status: 0 every case holds, 1 some do not, 2 the panel can't be used, 3 a live proof was stopped.
 """
 
 import json
@@ -9,17 +9,22 @@ import os
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from contextlib import closing, suppress
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from app.panel import load_panel
 from app.system.errors import KioskError
 from app.system.settings import Settings, panel_path
+from app.tools.cli.arguments import add_kiosk, kiosk_token
 from app.tools.cli.parser import Parser
 
+if TYPE_CHECKING:
+    from app.tools.prove.report import Subject
+    from app.tools.prove.result import Proof, Result
+
 PROG: Final = "python -m app.cli prove"
-HOLDS, FAULTS, UNUSABLE = range(3)
+HOLDS, FAULTS, UNUSABLE, STOPPED = range(4)
+ANSWERS: Final = ".proof-live.json"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -33,44 +38,88 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def _prove(options: Namespace) -> int:
     """Imported here: the help needs no server."""
-    from app.records.log_key import load_or_make_key
-    from app.tools.prove.proof import Result, prove
-    from app.tools.prove.report import Subject, as_html, as_json, as_text, signed
+    from app.tools.prove.report import subject_of
 
-    path = options.panel or Settings.from_environment().panel
-    panel = load_panel(path)
+    subject = subject_of(options.panel or Settings.from_environment().panel)
+    proof = _watched(options, subject) if options.live else _simulated(options, subject)
+    _report(options, subject, proof)
+    if proof.missing:
+        return STOPPED
+    return HOLDS if proof.holds else FAULTS
+
+
+def _simulated(options: Namespace, subject: "Subject") -> "Proof":
+    from app.tools.prove.proof import prove
+
     shows = sys.stderr.isatty()
 
-    def show(result: Result) -> None:
+    def show(result: "Result") -> None:
         if shows:
             print("✗" if result.fault else "·", end="", file=sys.stderr, flush=True)
 
-    proof = prove(panel, show, with_browser=not options.no_browser)
+    proof = prove(subject.panel, show, with_browser=not options.no_browser)
     if shows:
         print(file=sys.stderr)
+    return proof
+
+
+def _watched(options: Namespace, subject: "Subject") -> "Proof":
+    """The live proof, as far as it goes: Ctrl-C, the end of the input and the key q stop it."""
+    from app.tools.prove.answers import AnswersFile
+    from app.tools.prove.live import LiveProof, watcher_name
+    from app.tools.prove.live_robots import watched_robots
+    from app.tools.prove.terminal import Terminal
+
+    token = kiosk_token(options)
+    path = options.state or subject.path.with_suffix(ANSWERS)
+    with (
+        watched_robots(options.live, token, options.trust, subject.panel) as robots,
+        closing(AnswersFile(path, subject.path.name, subject.sha256)) as answers,
+        Terminal(out=sys.stderr if options.json else sys.stdout) as terminal,
+    ):
+        if answers.aside is not None:
+            terminal.say(
+                f"The answers so far are of another panel file: each case begins again. They are in"
+                f" {answers.aside}."
+            )
+        live = LiveProof(robots, answers, terminal, watcher_name(options.by, terminal))
+        with suppress(EOFError, KeyboardInterrupt):
+            live.run()
+        proof = live.proof()
+        proof.server = options.live
+        if proof.missing:
+            terminal.say(f"\nStopped. The same command continues; the answers are in {path}.")
+        return proof
+
+
+def _report(options: Namespace, subject: "Subject", proof: "Proof") -> None:
+    from app.records.log_key import load_or_make_key
+    from app.tools.prove.report import as_html, as_json, as_text, signed
+
     key = None
     if options.sign:
         own = {"KIOSK_DATA": options.data} if options.data else {}
         settings = Settings.from_environment({**os.environ, **own})
-        folder = settings.data or settings.data_folder(panel.mode)
+        folder = settings.data or settings.data_folder(subject.panel.mode)
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         key = load_or_make_key(folder)
-    report = signed(as_json(Subject(path, panel, datetime.now(UTC)), proof), key)
+    report = signed(as_json(subject, proof), key)
     if options.report is not None:
         options.report.write_text(as_html(report), encoding="utf-8")
     if options.json:
         print(json.dumps(report, indent=2, ensure_ascii=False))
     else:
         print(as_text(proof))
-    return HOLDS if proof.holds else FAULTS
 
 
 def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Proves a panel on its simulated robot: tries each control in each situation of its"
-        " interlocks, each end of a hold, and each alarm. Nothing reaches a real robot.",
-        epilog="Exit status: 0 every case holds, 1 some do not, 2 the panel can't be used.",
+        " interlocks, each end of a hold, and each alarm. Nothing reaches a real robot. With --live a"
+        " person tries the same at a real robot, step by step; the command only watches its panel.",
+        epilog="Exit status: 0 every case holds, 1 some do not, 2 the panel can't be used, 3 a live"
+        " proof was stopped: the same command continues it.",
     )
     add = parser.add_argument
     add("--json", action="store_true", help="print the report as JSON")
@@ -81,6 +130,15 @@ def make_parser(prog: str) -> Parser:
         help="sign the report with the key of the operator's log in the data folder",
     )
     add("--no-browser", action="store_true", help="do not look at the pages in Chromium")
+    add("--live", default="", metavar="URL", help="the running panel of a real robot")
+    add("--by", default="", metavar="NAME", help="who watches a live proof; else it is asked")
+    add(
+        "--state",
+        type=Path,
+        metavar="FILE",
+        help=f"where the answers of a live proof are kept (PANEL{ANSWERS})",
+    )
+    add_kiosk(parser)
     add("--data", metavar="FOLDER", help="the data folder (KIOSK_DATA), which has the key of --sign")
     add(
         "panel",

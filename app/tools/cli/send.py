@@ -6,20 +6,19 @@ not, 2 a mistake on the command line.
 """
 
 import asyncio
-import os
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from app.system.errors import KioskError, SettingsError, os_error_text
+from app.system.errors import KioskError, SettingsError
 from app.system.settings import panel_path
 from app.system.texts import render
+from app.tools.cli.arguments import TOKEN, add_kiosk, kiosk_token
 from app.tools.cli.parser import Parser
 
 PROG: Final = "python -m app.cli send"
-TOKEN: Final = "OPERATOR_PANEL_TOKEN"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -33,20 +32,9 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def _token(options: Namespace) -> str:
     """SettingsError if there is none."""
-    if options.token_file is not None:
-        try:
-            text: str = (
-                sys.stdin.readline()
-                if str(options.token_file) == "-"
-                else options.token_file.read_text()
-            )
-        except (OSError, UnicodeDecodeError) as error:
-            why = os_error_text(error) if isinstance(error, OSError) else "it is not text"
-            raise SettingsError(f"the token can't be read: {render(why)}") from error
-        return text.strip()
-    if token := os.environ.get(TOKEN, ""):
-        return token
-    raise SettingsError(f"an engineer's token is needed: --token-file FILE, or {TOKEN}")
+    if (token := kiosk_token(options)) is None:
+        raise SettingsError(f"an engineer's token is needed: --token-file FILE, or {TOKEN}")
+    return token
 
 
 async def _send(options: Namespace, token: str) -> int:
@@ -105,14 +93,7 @@ def make_parser(prog: str) -> Parser:
     add = parser.add_argument
     add("panel", metavar="PANEL", type=_panel, help="the panel file")
     add("--to", required=True, metavar="URL", help="the kiosk, such as https://panel1.local:8000")
-    add("--token-file", type=Path, metavar="FILE", help="a file with the token; - is standard input")
-    add(
-        "--trust",
-        default="",
-        metavar="FILE",
-        help="the certificate authority of the kiosk, or the SHA-256 of its certificate; default: the"
-        " system's authorities",
-    )
+    add_kiosk(parser)
     add("--yes", action="store_true", help="does not ask")
     return parser
 

@@ -1,4 +1,4 @@
-"""The panel file of a kiosk over HTTP: reads it, has another one checked, and sends that.
+"""A kiosk over HTTP: reads what it shows and its panel file, has another one checked, and sends that.
 
 A token is sent only over TLS whose certificate is trusted, or to this machine. It is in no address and
 in no file.
@@ -12,6 +12,8 @@ import re
 import secrets
 import ssl
 import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from http.client import (
     HTTPConnection,
     HTTPException,
@@ -39,21 +41,23 @@ TOKEN: Final = re.compile(r"[\x21-\x7e]+")
 
 class KioskRefused(InputError):
     """The kiosk has refused, with its sentence, or can't be reached. `is_lost`: whether it got the
-    request is not known."""
+    request is not known. `status` is that of its answer, 0 without one."""
 
-    def __init__(self, message: TextLike, *, is_lost: bool = False) -> None:
+    def __init__(self, message: TextLike, *, is_lost: bool = False, status: int = 0) -> None:
         super().__init__(message)
         self.is_lost = is_lost
+        self.status = status
 
 
 class KioskClient:
     """Each request has a connection of its own. Blocks."""
 
-    def __init__(self, address: str, token: str, trust: str = "", language: str = "en") -> None:
+    def __init__(self, address: str, token: str | None, trust: str = "", language: str = "en") -> None:
         """`trust` is the file of a certificate authority, or the SHA-256 of the kiosk's certificate; ""
-        for the system's authorities. KioskRefused for an address or a token that can't be used."""
+        for the system's authorities. Without a token (None) it is a client that is not signed in.
+        KioskRefused for an address or a token that can't be used."""
         self._headers = {"accept": "application/json", "accept-language": language}
-        self._token = token.strip()
+        self._token = None if token is None else token.strip()
         try:
             parsed = urlsplit(address.strip())
             self._host, self._port = parsed.hostname or "", parsed.port
@@ -64,7 +68,9 @@ class KioskClient:
             raise KioskRefused(say("send_address", address=address[:80]))
         if parsed.scheme == "http" and not is_loopback(self._host):
             raise KioskRefused(say("send_without_tls", host=self._host))
-        if not TOKEN.fullmatch(self._token) or len(self._token) > LONGEST_TOKEN:
+        if self._token is not None and (
+            not TOKEN.fullmatch(self._token) or len(self._token) > LONGEST_TOKEN
+        ):
             raise KioskRefused(say("send_token"))
         self._root = parsed.path.rstrip("/")
         self._is_tls = parsed.scheme == "https"
@@ -103,6 +109,40 @@ class KioskClient:
         status, content = self._request("GET", "/readyz", None, {}, WITHIN_S)
         return "" if status == 200 else str(content.get("reason", status))
 
+    def session(self) -> dict[str, Any]:
+        """Who this client is, and whether the panel has users."""
+        return self._json("GET", "/session")
+
+    def text(self, path: str, within_s: float = WITHIN_S) -> str:
+        """An answer that is text, such as the operator's log as CSV."""
+        with self._answer(path, within_s) as response:
+            return response.read(MOST_ANSWER).decode(errors="replace")
+
+    @contextmanager
+    def lines(self, path: str, within_s: float) -> Iterator[Iterator[bytes]]:
+        """The lines of a stream, until it ends. KioskRefused if it is refused, is lost, or has no line
+        for `within_s`."""
+        with self._answer(path, within_s) as response:
+            yield iter(response.readline, b"")
+
+    @contextmanager
+    def _answer(self, path: str, within_s: float) -> Iterator[HTTPResponse]:
+        connection = self._connected(within_s)
+        try:
+            connection.request("GET", self._root + path, None, self._headers | self._bearer)
+            response = connection.getresponse()
+            if response.status != 200:
+                raise _refusal(response.status, _content(response))
+            yield response
+        except (OSError, HTTPException) as error:
+            raise self._lost(error) from error
+        finally:
+            connection.close()
+
+    @property
+    def _bearer(self) -> dict[str, str]:
+        return {} if self._token is None else {"authorization": f"Bearer {self._token}"}
+
     def _json(
         self,
         method: str,
@@ -111,13 +151,11 @@ class KioskClient:
         headers: dict[str, str] | None = None,
         within_s: float = WITHIN_S,
     ) -> dict[str, Any]:
-        bearer = {"authorization": f"Bearer {self._token}"}
-        status, content = self._request(method, path, body, bearer | (headers or {}), within_s)
+        status, content = self._request(method, path, body, self._bearer | (headers or {}), within_s)
         if "outcome" in content and "act" in content:  # a receipt, also of what was refused
             return content
         if status != 200 or not content:
-            reason = content.get("error") or content.get("reason")
-            raise KioskRefused(str(reason) if reason else say("send_status", status=str(status)))
+            raise _refusal(status, content)
         return content
 
     def _request(
@@ -129,10 +167,13 @@ class KioskClient:
             response = connection.getresponse()
             return response.status, _content(response)
         except (OSError, HTTPException) as error:
-            why = os_error_text(error) if isinstance(error, OSError) else str(error)
-            raise KioskRefused(say("send_lost", host=self._host, why=why), is_lost=True) from error
+            raise self._lost(error) from error
         finally:
             connection.close()
+
+    def _lost(self, error: OSError | HTTPException) -> KioskRefused:
+        why = os_error_text(error) if isinstance(error, OSError) else str(error)
+        return KioskRefused(say("send_lost", host=self._host, why=why), is_lost=True)
 
     def _connected(self, within_s: float) -> HTTPConnection:
         """A connection to the kiosk itself; nothing was sent yet."""
@@ -165,6 +206,12 @@ def is_loopback(host: str) -> bool:
         return host == "localhost" or ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _refusal(status: int, content: Mapping[str, Any]) -> KioskRefused:
+    reason = content.get("error") or content.get("reason")
+    said = str(reason) if reason else say("send_status", status=str(status))
+    return KioskRefused(said, status=status)
 
 
 def _content(response: HTTPResponse) -> dict[str, Any]:

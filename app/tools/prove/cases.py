@@ -12,6 +12,7 @@ from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.key_parts import confirmation_of
 from app.panel.widgets.recipe_load import RecipeLoad
+from app.system.texts.text import each_language
 
 Situation = Literal[
     "permits", "forbids", "never_seen", "old", "other_type", "publisher_gone",
@@ -156,3 +157,14 @@ def judged_fields(panel: Panel) -> Mapping[Field, Sequence[Condition]]:
         if condition.robot is None:
             judged.setdefault((condition.topic, condition.field), []).append(condition)
     return judged
+
+
+def names_interlock(reasons: str, interlock: Interlock) -> bool:
+    """Whether a reason that the page shows is about this interlock: its name, its topic, or its own
+    sentence."""
+    said = [*each_language(interlock.name).values(), *each_language(interlock.subject).values()]
+    if interlock.own_sentence is not None:
+        said += [
+            text.partition("{value}")[0] for text in each_language(interlock.own_sentence).values()
+        ]
+    return any(text and text in reasons for text in (*said, interlock.topic))

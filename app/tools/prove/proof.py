@@ -12,10 +12,9 @@ import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -36,9 +35,9 @@ from app.panel.widgets.templated import is_stop
 from app.records.entry import GOOD_OUTCOMES
 from app.system.errors import KioskError
 from app.system.texts import render
-from app.system.texts.text import each_language
 from app.tools.prove.browser import PageView, has_browser
-from app.tools.prove.cases import Guarded, HoldEnd, Plan, Situation, plan_of
+from app.tools.prove.cases import Guarded, HoldEnd, Plan, Situation, names_interlock, plan_of
+from app.tools.prove.result import Proof, Result
 from app.tools.prove.rig import Rig, add_user
 from app.tools.prove.robot import ProvingRobot
 
@@ -53,37 +52,6 @@ ENDED_WITHIN_S: Final = 12.0  # a goal of the simulated robot
 BEATS_S: Final = 0.08
 HELD_S: Final = 0.3
 OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
-
-
-class Result(NamedTuple):
-    """A case with its result: `fault` is "" where it holds. `took_s` is how long the page took to
-    show it, or a hold to stop, None where nothing was timed. `shown` is the reason on the page."""
-
-    kind: str  # "control", "hold" or "alarm"
-    name: str
-    guard: str
-    situation: str
-    fault: str
-    took_s: float | None = None
-    shown: str = ""
-
-
-@dataclass
-class Proof:
-    """What was proved, and how long it took; `left_out` has why something was not."""
-
-    results: list[Result] = field(default_factory=list)
-    left_out: dict[str, str] = field(default_factory=dict)
-    took_s: float = 0.0
-    browser: str = ""  # in which the pages were looked at, "" for none
-
-    @property
-    def faults(self) -> list[Result]:
-        return [result for result in self.results if result.fault]
-
-    @property
-    def holds(self) -> bool:
-        return bool(self.results) and not self.faults
 
 
 def prove(
@@ -233,7 +201,7 @@ class _Round:
         free = [name for name, guarded in self._plan.controls.items() if not guarded.guards]
         if free:
             self._rig.shown.wait(
-                lambda: any(not self._rig.is_locked(name) for name in free) and self._knows(),
+                lambda: any(not self._rig.shown.is_locked(name) for name in free) and self._knows(),
                 JOINED_WITHIN_S,
             )
         else:
@@ -258,7 +226,7 @@ class _Round:
                     self._works(guarded, interlock.id)
 
     def _await_free(self, name: str) -> None:
-        self._rig.shown.wait(lambda: not self._rig.is_locked(name), SHOWN_WITHIN_S)
+        self._rig.shown.wait(lambda: not self._rig.shown.is_locked(name), SHOWN_WITHIN_S)
 
     def _permit_others(self, guarded: Guarded, interlock: Interlock) -> None:
         """Interlocks of this control on the field of another round have a value that permits it."""
@@ -308,12 +276,13 @@ class _Round:
                 self._report(name, interlock.id, situation, fault, timed)
 
     def _is_locked_by(self, name: str, interlock: Interlock) -> bool:
-        return self._rig.is_locked(name) and names_interlock(self._rig.reasons(name), interlock)
+        shown = self._rig.shown
+        return shown.is_locked(name) and names_interlock(shown.reasons(name), interlock)
 
     def _why_not_locked(self, name: str, interlock: Interlock) -> str:
-        if not self._rig.is_locked(name):
+        if not self._rig.shown.is_locked(name):
             return "the page shows it as free"
-        return f'the reason does not name "{render(interlock.name)}": {self._rig.reasons(name)}'
+        return f'the reason does not name "{render(interlock.name)}": {self._rig.shown.reasons(name)}'
 
     def _seen(self, name: str, *, locked: bool, interlock: Interlock | None = None) -> str:
         """That the browser shows a control as it is; "" if so, and where no page has a button for
@@ -346,9 +315,9 @@ class _Round:
         """That a press arrives at the robot where everything permits."""
         name = str(guarded.control.id)
         began = time.monotonic()
-        at = self._rig.shown.wait(lambda: not self._rig.is_locked(name), SHOWN_WITHIN_S)
+        at = self._rig.shown.wait(lambda: not self._rig.shown.is_locked(name), SHOWN_WITHIN_S)
         if at is None:
-            self._leave_out(name, guard, self._rig.reasons(name))
+            self._leave_out(name, guard, self._rig.shown.reasons(name))
             return
         took_s = max(0.0, at - began)
         if fault := self._seen(name, locked=False):
@@ -391,7 +360,7 @@ class _Round:
 
     def _cut_off(self, guarded: Guarded, situation: Situation, began: float) -> None:
         name = str(guarded.control.id)
-        at = self._rig.shown.wait(lambda: self._rig.is_locked(name), 2 * SHOWN_WITHIN_S)
+        at = self._rig.shown.wait(lambda: self._rig.shown.is_locked(name), 2 * SHOWN_WITHIN_S)
         fault = "the page shows it as free" if at is None else self._seen(name, locked=True)
         fault = fault or self._refuses(guarded)
         self._report(name, "", situation, fault, None if at is None else max(0.0, at - began))
@@ -581,7 +550,7 @@ class _Round:
         took_s: float | None = None,
         kind: str = "control",
     ) -> None:
-        shown = self._rig.reasons(name) if kind == "control" else ""
+        shown = self._rig.shown.reasons(name) if kind == "control" else ""
         self._tell(Result(kind, name, guard, situation, fault, took_s, shown))
 
 
@@ -615,14 +584,3 @@ def _example_of(widget: Parameter) -> Any:
         value = widget.min if widget.min is not None else widget.max if widget.max is not None else 0
         return int(value) if widget.element_type == "integer" else float(value)
     return "a"
-
-
-def names_interlock(reasons: str, interlock: Interlock) -> bool:
-    """Whether a reason that the page shows is about this interlock: its name, its topic, or its own
-    sentence."""
-    said = [*each_language(interlock.name).values(), *each_language(interlock.subject).values()]
-    if interlock.own_sentence is not None:
-        said += [
-            text.partition("{value}")[0] for text in each_language(interlock.own_sentence).values()
-        ]
-    return any(text and text in reasons for text in (*said, interlock.topic))

@@ -11,11 +11,12 @@ from typing import Any, Final
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from app.panel import Panel
+from app.panel import Panel, load_panel
 from app.records.log_key import LogKey
+from app.system.errors import KioskError
 from app.system.settings import shipped_path
 from app.system.version import installed_version
-from app.tools.prove.proof import Proof, Result
+from app.tools.prove.result import Proof, Result
 
 TEMPLATE: Final = "proof.html"
 # What each situation is, for a reader of the report.
@@ -43,11 +44,17 @@ class Subject:
 
     path: Path
     panel: Panel
+    sha256: str
     at: datetime
 
-    @property
-    def sha256(self) -> str:
-        return hashlib.sha256(self.path.read_bytes()).hexdigest()
+
+def subject_of(path: Path) -> Subject:
+    """The panel file as it is now. KioskError if it can't be used, or changes while it is read."""
+    panel = load_panel(path)
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    if not sha256.startswith(panel.revision):
+        raise KioskError(f"{path} was changed while it was read: try again")
+    return Subject(path, panel, sha256, datetime.now(UTC))
 
 
 def as_json(subject: Subject, proof: Proof) -> dict[str, Any]:
@@ -59,6 +66,10 @@ def as_json(subject: Subject, proof: Proof) -> dict[str, Any]:
         "version": installed_version(),
         "zenoh": installed_version("eclipse-zenoh"),
         "at": subject.at.astimezone(UTC).isoformat(timespec="seconds"),
+        "kind": proof.kind,
+        "server": proof.server,
+        "watched_by": proof.watchers,
+        "missing_steps": proof.missing,
         "holds": proof.holds,
         "cases": len(proof.results),
         "faults": len(proof.faults),
@@ -75,9 +86,13 @@ def _row(result: Result) -> dict[str, Any]:
 
 
 def in_order(results: Iterable[Result]) -> list[Result]:
-    """By control, interlock and situation: the same for each proof of a panel."""
+    """By robot, control, interlock and situation: the same for each proof of a panel."""
     order = [*SITUATIONS]
-    return sorted(results, key=lambda row: (row.kind, row.name, row.guard, order.index(row.situation)))
+
+    def place(row: Result) -> tuple[object, ...]:
+        return row.robot, row.kind, row.name, row.guard, order.index(row.situation)
+
+    return sorted(results, key=place)
 
 
 def signed(report: Mapping[str, Any], key: LogKey | None) -> dict[str, Any]:
@@ -108,18 +123,27 @@ def as_html(report: Mapping[str, Any]) -> str:
     )  # fmt: skip
     counts = Counter(row["situation"] for row in rows)
     return environment.get_template(TEMPLATE).render(
-        report=report, situations=SITUATIONS, counts=counts, longest=longest
+        report=report,
+        situations=SITUATIONS,
+        counts=counts,
+        longest=longest,
+        live=report["kind"] == "live",
+        robots=any(row["robot"] for row in rows),
     )
 
 
 def as_text(proof: Proof) -> str:
     """What the command prints: each fault, and a line that sums up."""
     lines = [
-        f"{row.kind} {row.name}{f', interlock {row.guard}' if row.guard else ''}:"
+        f"{f'robot {row.robot}, ' if row.robot else ''}{row.kind} {row.name}"
+        f"{f', interlock {row.guard}' if row.guard else ''}:"
         f" {SITUATIONS[row.situation]}: {row.fault}"
         for row in in_order(proof.faults)
     ]
     lines += [f"not proved: {name}: {why}" for name, why in sorted(proof.left_out.items())]
-    verdict = "every case holds" if proof.holds else f"{len(proof.faults)} do not hold"
-    lines.append(f"{len(proof.results)} cases in {proof.took_s:.0f} s: {verdict}")
+    verdict = "every case holds" if not proof.faults else f"{len(proof.faults)} do not hold"
+    if proof.missing:
+        verdict = f"{verdict}, {proof.missing} steps were not reached"
+    took = f" in {proof.took_s:.0f} s" if proof.kind == "simulated" else ""
+    lines.append(f"{len(proof.results)} cases{took}: {verdict}")
     return "\n".join(lines)

@@ -9,7 +9,7 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import AsyncExitStack, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -34,6 +34,7 @@ from app.ros.messages import load_interfaces
 from app.system.errors import KioskError
 from app.system.settings import Settings, shipped_path
 from app.tools.prove.robot import ProvingRobot
+from app.tools.prove.shown import Shown, read_events
 from app.tools.simulator.zenoh import ANY_PORT, Simulator, way_of
 from app.web.app_state import AppState
 from app.web.application import load_pages, new_application, page_assets, page_revision
@@ -53,41 +54,6 @@ PACE_S: Final = 0.022  # between two presses: a client may press 50 times in a s
 
 
 @dataclass
-class Shown:
-    """What the events of a page have said last. Changed by the thread that reads them."""
-
-    widgets: dict[str, dict[str, Any]] = field(default_factory=dict)
-    alarms: dict[str, Any] = field(default_factory=dict)
-    event_id: str = ""
-    changed_at: float = 0.0  # monotonic seconds
-    changed: threading.Condition = field(default_factory=threading.Condition)
-
-    def take(self, event: str, data: Mapping[str, Any]) -> None:
-        with self.changed:
-            if event == "snapshot":
-                self.widgets = {name: dict(values) for name, values in data["widgets"].items()}
-                self.alarms = dict(data["alarms"])
-            elif event == "update":
-                for name, values in data.items():
-                    self.widgets.setdefault(name, {}).update(values)
-            elif event == "alarms":
-                rows = {**self.alarms.get("rows", {}), **data.get("rows", {})}
-                self.alarms = {**self.alarms, **data, "rows": rows}
-            self.changed_at = time.monotonic()
-            self.changed.notify_all()
-
-    def wait(self, condition: Callable[[], bool], within_s: float) -> float | None:
-        """When a condition was true (monotonic seconds); None if it was not in time."""
-        end = time.monotonic() + within_s
-        with self.changed:
-            while not condition():
-                if (left_s := end - time.monotonic()) <= 0:
-                    return None
-                self.changed.wait(left_s)
-            return self.changed_at
-
-
-@dataclass
 class Rig:
     """A running panel with its proving robot. Used by the thread of one round of the proof."""
 
@@ -95,7 +61,7 @@ class Rig:
     robot: ProvingRobot
     data: Path
     shown: Shown = field(default_factory=Shown)
-    port: int = 0
+    port: int = 0  # any that is free
     simulator: Simulator | None = None
     _simulating: ExitStack = field(default_factory=ExitStack)
     _state: AppState | None = None
@@ -173,7 +139,7 @@ class Rig:
             app = new_application(settings, self.panel.embed)
             app.state.app_state = self._state
             await load_pages(app, self._state, self.panel)
-            listening = socket.create_server(("127.0.0.1", 0))
+            listening = socket.create_server(("127.0.0.1", self.port))
             self.port = listening.getsockname()[1]
             config = uvicorn.Config(
                 app, log_level="error", timeout_graceful_shutdown=1, lifespan="off", **OPTIONS
@@ -263,15 +229,6 @@ class Rig:
         finally:
             self._cookie = own
 
-    def is_locked(self, control: str) -> bool:
-        """Whether the events of the page say that a control is locked."""
-        return self.shown.widgets.get(control, {}).get("enabled") is False
-
-    def reasons(self, control: str) -> str:
-        """Why it is locked, as the page says it."""
-        shown = self.shown.widgets.get(control, {})
-        return str(shown.get("reasons") or shown.get("reason") or "")
-
     def _keep_control(self) -> None:
         """As the page of a holder that is touched."""
         own = self._cookie
@@ -289,15 +246,10 @@ class Rig:
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         try:
             connection.request("GET", "/events", headers={"cookie": self._cookie})
-            event, answer = "", connection.getresponse()
-            while not self._ends.is_set() and (line := answer.readline().decode()):
-                name, _, value = line.rstrip("\n").partition(": ")
-                if name == "event":
-                    event = value
-                elif name == "id":
-                    self.shown.event_id = value
-                elif name == "data":
-                    self.shown.take(event, json.loads(value))
+            for event in read_events(iter(connection.getresponse().readline, b"")):
+                if self._ends.is_set():
+                    break
+                self.shown.take(event)
         finally:
             connection.close()
 

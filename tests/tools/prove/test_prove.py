@@ -15,7 +15,8 @@ from app.panel import Panel, load_panel
 from app.tools.cli.prove import main
 from app.tools.prove import proof as proving
 from app.tools.prove.cases import plan_of
-from app.tools.prove.proof import Proof, prove
+from app.tools.prove.proof import prove
+from app.tools.prove.result import Proof
 
 PANEL = """
 title = "Cell"
