@@ -15,12 +15,12 @@ from app.panel.widgets.recipe_load import RecipeLoad
 from app.system.texts.text import each_language
 
 Situation = Literal[
-    "permits", "forbids", "never_seen", "old", "other_type", "publisher_gone",
+    "permits", "forbids", "never_seen", "old", "other_type", "publisher_gone", "robot_lost",
     "link_cut", "no_control", "no_role", "shutdown",
 ]  # fmt: skip
 # Those of one interlock, in the order in which they are made.
 OF_INTERLOCK: Final[Sequence[Situation]] = (
-    "never_seen", "permits", "forbids", "old", "other_type", "publisher_gone",
+    "never_seen", "permits", "forbids", "old", "other_type", "publisher_gone", "robot_lost",
 )  # fmt: skip
 HoldEnd = Literal["released", "page_gone", "no_beat", "forbids", "link_cut"]
 HOLD_ENDS: Final[Sequence[HoldEnd]] = ("released", "page_gone", "no_beat", "forbids")
@@ -62,8 +62,9 @@ class Plan:
     """What is proved. `rounds` are interlocks that can be examined at the same time: no control has two
     of a round, and no two of a round are read from one field."""
 
+    robot: str  # its id, "" for the only one
     controls: Mapping[str, Guarded]
-    interlocks: Mapping[str, Interlock]
+    interlocks: Mapping[str, Interlock]  # also those of other robots that guard a control
     rounds: Sequence[Sequence[Interlock]]
     alarms: Sequence[Alarm]
     left_out: Mapping[str, str]  # control or alarm → why it is not proved
@@ -73,7 +74,7 @@ class Plan:
         for guarded in self.controls.values():
             name = str(guarded.control.id)
             for guard in sorted(guarded.guards):
-                for situation in situations(self.interlocks[guard]):
+                for situation in situations(self.interlocks[guard], self.robot):
                     yield Case(name, guard, situation)
             if not guarded.guards:
                 yield Case(name, "", "permits")
@@ -88,26 +89,27 @@ class Plan:
                     yield HoldCase(str(guarded.control.id), "forbids", guard)
 
 
-def situations(interlock: Interlock) -> Iterator[Situation]:
-    """The situations that an interlock can be in."""
+def situations(interlock: Interlock, robot: str) -> Iterator[Situation]:
+    """The situations that an interlock can be in, for the controls of a robot."""
     for situation in OF_INTERLOCK:
         if situation == "old" and interlock.max_age_s is None:
             continue
         if situation == "publisher_gone" and not interlock.require_publisher:
             continue
+        if situation == "robot_lost" and interlock.robot in (None, robot):
+            continue
         yield situation
 
 
-def plan_of(panel: Panel) -> Plan:
-    """The plan for the robot without a name, or for a panel of one robot (`panel_of`)."""
-    interlocks = {each.id: each for each in panel.interlocks if each.robot is None}
+def plan_of(panel: Panel, robot: str = "") -> Plan:
+    """The plan for the robot without a name, or for the `robot` (its id) whose panel this is
+    (`panel_of`)."""
+    interlocks = {each.id: each for each in panel.every_interlock}
     left_out: dict[str, str] = {}
     controls: dict[str, Guarded] = {}
     for widget in panel.commands:
         guards = frozenset(widget.interlocks)
-        if unknown := guards - interlocks.keys():
-            left_out[str(widget.id)] = f"its interlock {min(unknown)} is another robot's"
-        elif confirmation_of(widget):
+        if confirmation_of(widget):
             left_out[str(widget.id)] = "a person confirms it with a PIN"
         elif isinstance(widget, RecipeLoad):
             left_out[str(widget.id)] = "a recipe is chosen on its page"
@@ -116,12 +118,19 @@ def plan_of(panel: Panel) -> Plan:
     used = {guard for guarded in controls.values() for guard in guarded.guards}
     alarms = []
     for alarm in panel.alarms:
+        if not alarm.is_for(robot or None):
+            continue
         if provable(alarm):
             alarms.append(alarm)
         else:
             left_out[f"alarm {alarm.id}"] = f"alarms by {alarm.source} are not raised by a value"
     chosen = [each for name, each in interlocks.items() if name in used]
-    return Plan(controls, interlocks, rounds(chosen, controls), tuple(alarms), left_out)
+    return Plan(robot, controls, interlocks, rounds(chosen, controls), tuple(alarms), left_out)
+
+
+def alarm_key(name: str, robot: str) -> str:
+    """The id of an alarm at the server; `robot` is the id of one of several."""
+    return f"{name}@{robot}" if robot else name
 
 
 def provable(alarm: Alarm) -> bool:
@@ -145,16 +154,16 @@ def rounds(
 
 
 def _conflict(interlock: Interlock, other: Interlock, controls: Mapping[str, Guarded]) -> bool:
-    if interlock.topic == other.topic:
+    if (interlock.robot, interlock.topic) == (other.robot, other.topic):
         return True
     return any({interlock.id, other.id} <= guarded.guards for guarded in controls.values())
 
 
-def judged_fields(panel: Panel) -> Mapping[Field, Sequence[Condition]]:
-    """The fields that interlocks and conditions judge, with these."""
+def judged_fields(panel: Panel, robot: str) -> Mapping[Field, Sequence[Condition]]:
+    """The fields of a robot that interlocks and conditions judge, with these."""
     judged: dict[Field, list[Condition]] = {}
     for condition in panel.named_conditions:
-        if condition.robot is None:
+        if condition.robot in (None, robot):
             judged.setdefault((condition.topic, condition.field), []).append(condition)
     return judged
 

@@ -49,6 +49,6 @@ def watched_robots(
                 )
             outside = KioskClient(address, None, trust)
             stranger = watch(outside, robot, name, reads_log=False) if has_users else None
-            steps = [*steps_of(own, plan_of(own), has_users=has_users)]
+            steps = [*steps_of(own, plan_of(own, robot), has_users=has_users)]
             robots.append(Watched(own, watching, stranger, steps, robot))
         yield robots

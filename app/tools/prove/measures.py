@@ -12,7 +12,7 @@ from app.panel.model import Panel
 from app.records.entry import GOOD_OUTCOMES
 from app.system.printable import readable
 from app.system.texts import render
-from app.tools.prove.cases import names_interlock
+from app.tools.prove.cases import alarm_key, names_interlock
 from app.tools.prove.steps import Row
 from app.tools.prove.watch import Entry, PanelWatch
 
@@ -84,7 +84,7 @@ class Measure:
         return self.row.kind == "control" and self.row.situation not in PRESSED
 
     def _interlock(self) -> Interlock:
-        return next(each for each in self.panel.interlocks if each.id == self.row.guard)
+        return next(each for each in self.panel.every_interlock if each.id == self.row.guard)
 
     def _is_permitted(self, guard: str) -> bool:
         return self.watch.shown.interlocks.get(guard, {}).get("enabled") is True
@@ -119,7 +119,7 @@ class Measure:
             self._say("free")
         else:
             self._say(f"locked: {reasons}")
-            return names_interlock(reasons, interlock)
+            return self.row.situation == "robot_lost" or names_interlock(reasons, interlock)
         return False
 
     def _cut(self) -> bool:
@@ -171,10 +171,14 @@ class Measure:
             return entry["outcome"] == "aborted" and names_interlock(entry["reason"], self._interlock())
         return entry["outcome"] == "aborted"
 
+    @property
+    def _alarm_key(self) -> str:
+        return alarm_key(self.row.name, self.watch.robot)
+
     def _alarm(self) -> bool:
         """Raised, acknowledged where that is required, and returned, in this order."""
         alarm = next(each for each in self.panel.alarms if each.id == self.row.name)
-        shown = self.watch.shown.alarm(self.row.name)
+        shown = self.watch.shown.alarm(self._alarm_key)
         state, after_s = str(shown.get("state", "")), time.monotonic() - self.began
         if state == "active":
             self._pass("raised", after_s)

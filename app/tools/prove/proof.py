@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from websockets.typing import Origin
 from app.panel.alarm import Alarm
 from app.panel.condition import Interlock
 from app.panel.model import Panel
+from app.panel.robot_panels import panel_of
 from app.panel.template import input_ids
 from app.panel.widgets.families import Command, Input
 from app.panel.widgets.hold import HoldCommand
@@ -33,13 +34,21 @@ from app.panel.widgets.publish import Step
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.templated import is_stop
 from app.records.entry import GOOD_OUTCOMES
-from app.system.errors import KioskError
 from app.system.texts import render
 from app.tools.prove.browser import PageView, has_browser
-from app.tools.prove.cases import Guarded, HoldEnd, Plan, Situation, names_interlock, plan_of
+from app.tools.prove.cases import (
+    Guarded,
+    HoldEnd,
+    Plan,
+    Situation,
+    alarm_key,
+    names_interlock,
+    plan_of,
+    situations,
+)
 from app.tools.prove.result import Proof, Result
 from app.tools.prove.rig import Rig, add_user
-from app.tools.prove.robot import ProvingRobot
+from app.tools.prove.robot import ProvingRobots
 
 AT_ONCE: Final = 3  # rounds
 SHOWN_WITHIN_S: Final = 3.0  # a lock or its end, on the page
@@ -57,14 +66,9 @@ OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of the
 def prove(
     panel: Panel, on_result: Callable[[Result], None] = lambda _: None, *, with_browser: bool = True
 ) -> Proof:
-    """The proof of a panel with one robot; `with_browser`: its pages are looked at in Chromium too, if
-    there is one. KioskError if the panel can't be served."""
-    if panel.robots:
-        raise KioskError(
-            "this panel has several robots: prove proves panels of one robot, as each of them is one"
-        )
-    began, plan, proof = time.monotonic(), plan_of(panel), Proof()
-    proof.left_out = dict(plan.left_out)
+    """The proof of a panel, for each of its robots; `with_browser`: its pages are looked at in Chromium
+    too, if there is one. KioskError if the panel can't be served."""
+    began, proof = time.monotonic(), Proof()
     proof.browser = has_browser() if with_browser else ""
     lock = threading.Lock()
 
@@ -75,23 +79,30 @@ def prove(
 
     looks = bool(proof.browser) and not panel.control.required  # the proof's own client has control
 
-    def examine(chosen: Sequence[Interlock], folder: Path) -> None:
+    def examine(robot: str, plan: Plan, chosen: Sequence[Interlock], folder: Path) -> None:
         """A round of interlocks, or without any the panel as a whole."""
+        make = partial(_Round, panel, robot, plan, tell=tell)
         if chosen:
-            _Round(panel, plan, folder, tell, looks=looks).interlocks(chosen)
+            make(folder=folder, looks=looks).interlocks(chosen)
         else:
-            _Round(panel, plan, folder / "whole", tell, looks=looks).whole()
-            _Round(panel, plan, folder / "roles", tell, looks=False).roles()
-            _Round(panel, plan, folder / "ending", tell, looks=False).ending()
+            make(folder=folder / "whole", looks=looks).whole()
+            make(folder=folder / "roles", looks=False).roles()
+            make(folder=folder / "ending", looks=False).ending()
 
     with (
         tempfile.TemporaryDirectory(prefix="operator-panel-proof-") as folder,
         ThreadPoolExecutor(AT_ONCE) as pool,
     ):
-        rounds = (*plan.rounds, ())
-        places = [Path(folder) / str(number) for number in range(len(rounds))]
-        for _ in pool.map(examine, rounds, places):
-            pass  # what a round raises is raised here
+        rounds: list[Future[None]] = []
+        for robot in [str(entry.id) for entry in panel.robots] or [""]:
+            plan = plan_of(panel_of(panel, robot or None), robot)
+            named = f"{robot}: " if robot else ""
+            proof.left_out |= {f"{named}{name}": why for name, why in plan.left_out.items()}
+            for chosen in (*plan.rounds, ()):
+                place = Path(folder) / str(len(rounds))
+                rounds.append(pool.submit(examine, robot, plan, chosen, place))
+        for examined in rounds:
+            examined.result()  # what a round raises is raised here
     proof.took_s = time.monotonic() - began
     return proof
 
@@ -102,18 +113,22 @@ class _Round:
     def __init__(
         self,
         panel: Panel,
+        robot: str,
         plan: Plan,
+        *,
         folder: Path,
         tell: Callable[[Result], None],
-        *,
         looks: bool,
     ) -> None:
-        """`looks`: its pages are looked at in a browser."""
-        self._panel = panel
+        """`robot` is the id of the one that is proved, of several; `looks`: its pages are looked at in
+        a browser."""
+        self._robot_name = robot
         self._plan = plan
         self._tell = tell
-        self._robot = ProvingRobot(panel)
-        self._rig = Rig(panel, self._robot, folder / "data")
+        self._robots = ProvingRobots(panel, robot)
+        self._robot = self._robots.own
+        self._rig = Rig(panel, self._robots, folder / "data")
+        self._panel = panel = panel_of(panel, robot or None)
         self._view = PageView(folder / "browser") if looks else None
         self._pages = {
             str(widget.id): str(page.id)
@@ -128,9 +143,8 @@ class _Round:
     def interlocks(self, chosen: Sequence[Interlock]) -> None:
         """The situations of some interlocks, of which no control has two."""
         together = {guard for each in chosen for guard in self._together(each)}
-        topics = {each.topic for each in chosen}
-        self._robot.permit(chosen, together)
-        self._robot.silence(topics)
+        self._robots.permit(chosen, together)
+        self._robots.silence(chosen)
         with self._rig, self._view or nullcontext():
             self._await_link()
             self._locked("never_seen", chosen, time.monotonic())
@@ -139,7 +153,7 @@ class _Round:
             self._permitted(chosen, together, again=True)
             aged = [each for each in chosen if each.max_age_s is not None]
             if aged:
-                self._robot.silence({each.topic for each in aged})
+                self._robots.silence(aged)
                 self._locked("old", aged, time.monotonic())
                 self._permitted(chosen, together, again=True)
             self._announced("other_type", chosen, chosen, together)
@@ -151,12 +165,23 @@ class _Round:
                         self._permit_others(guarded, each)
                         self._await_free(str(guarded.control.id))
                         self._hold(guarded, "forbids", each)
+            self._without_others(chosen, together)
+
+    def _without_others(self, chosen: Sequence[Interlock], together: Collection[str]) -> None:
+        """The robots of interlocks that are of others are lost, and stay so."""
+        for each in chosen:
+            if "robot_lost" in situations(each, self._plan.robot):
+                self._permitted(chosen, together, again=True)
+                began = time.monotonic()
+                self._rig.cut(self._robots.name_for(each))
+                for guarded in self._guarded(each):
+                    self._cut_off(guarded, "robot_lost", began, each.id)
 
     def whole(self) -> None:
         """What concerns the panel as a whole: controls without interlocks, holds, alarms, the link, the
         end of the server."""
         interlocks = [*self._plan.interlocks.values()]
-        self._robot.permit(())
+        self._robots.permit(())
         with self._rig, self._view or nullcontext():
             self._await_link()
             for guarded in self._plan.controls.values():
@@ -169,10 +194,10 @@ class _Round:
                     self._permit_for(guarded, interlocks)
                     for end in ("released", "page_gone", "no_beat"):
                         self._hold(guarded, end, None)
-            self._robot.permit(())
+            self._robots.permit(())
             for alarm in self._plan.alarms:
                 self._alarm(alarm)
-            self._rig.cut()
+            self._rig.cut(self._robots.name)
             began = time.monotonic()
             for guarded in self._plan.controls.values():
                 self._cut_off(guarded, "link_cut", began)
@@ -180,7 +205,7 @@ class _Round:
     def ending(self) -> None:
         """The server begins to end while everything permits."""
         interlocks = [*self._plan.interlocks.values()]
-        self._robot.permit(())
+        self._robots.permit(())
         with self._rig:
             self._await_link()
             self._rig.shut_down()
@@ -190,7 +215,7 @@ class _Round:
 
     def _permit_for(self, guarded: Guarded, interlocks: Sequence[Interlock]) -> None:
         chosen = [each for each in interlocks if each.id in guarded.guards]
-        self._robot.permit(chosen, guarded.guards)
+        self._robots.permit(chosen, guarded.guards)
         self._await_free(str(guarded.control.id))
 
     # Situations.
@@ -215,7 +240,7 @@ class _Round:
         self, chosen: Sequence[Interlock], together: Collection[str], *, again: bool = False
     ) -> None:
         """Everything permits: each control works. `again`: only that it is not locked any more."""
-        self._robot.permit(chosen, together)
+        self._robots.permit(chosen, together)
         for interlock in chosen:
             for guarded in self._guarded(interlock):
                 name = str(guarded.control.id)
@@ -232,12 +257,12 @@ class _Round:
         """Interlocks of this control on the field of another round have a value that permits it."""
         others = [each for name, each in self._plan.interlocks.items() if name in guarded.guards]
         ordered = sorted(others, key=lambda each: each.id == interlock.id)  # the last decides its field
-        self._robot.permit(ordered, guarded.guards)
+        self._robots.permit(ordered, guarded.guards)
 
     def _forbidden(self, chosen: Sequence[Interlock], together: Collection[str]) -> None:
         began = time.monotonic()
         for interlock in chosen:
-            self._robot.forbid(interlock, together)
+            self._robots.forbid(interlock, together)
         self._locked("forbids", chosen, began)
 
     def _announced(
@@ -248,16 +273,15 @@ class _Round:
         together: Collection[str],
     ) -> None:
         """The publishers of some interlocks have another type, or are gone."""
-        simulator = self._rig.simulator
-        if not changed or simulator is None:
+        if not changed:
             return
         began = time.monotonic()
         for interlock in changed:
             other = next(name for name in OTHER_TYPES if name != interlock.type)
-            simulator.announce(interlock.topic, other, gone=situation == "publisher_gone")
+            self._rig.announce(interlock, other, gone=situation == "publisher_gone")
         self._locked(situation, changed, began)
         for interlock in changed:
-            simulator.announce(interlock.topic)
+            self._rig.announce(interlock)
         self._permitted(chosen, together, again=True)
 
     # What must be.
@@ -290,7 +314,7 @@ class _Round:
         page = self._pages.get(name)
         if self._view is None or page is None:
             return ""
-        self._view.open(f"http://127.0.0.1:{self._rig.port}/pages/{page}")
+        self._view.open(f"http://127.0.0.1:{self._rig.port}{self._rig.root}/pages/{page}")
         seen = self._view.shows(name, locked=locked, within_s=BROWSER_WITHIN_S)
         if seen.locked is None:
             return ""
@@ -353,17 +377,17 @@ class _Round:
     def roles(self) -> None:
         """With users: a client that is not signed in presses each control."""
         add_user(self._rig.data)
-        self._robot.permit(())
+        self._robots.permit(())
         with self._rig:
             self._await_link()
             self._without_right("no_role")
 
-    def _cut_off(self, guarded: Guarded, situation: Situation, began: float) -> None:
+    def _cut_off(self, guarded: Guarded, situation: Situation, began: float, guard: str = "") -> None:
         name = str(guarded.control.id)
         at = self._rig.shown.wait(lambda: self._rig.shown.is_locked(name), 2 * SHOWN_WITHIN_S)
         fault = "the page shows it as free" if at is None else self._seen(name, locked=True)
         fault = fault or self._refuses(guarded)
-        self._report(name, "", situation, fault, None if at is None else max(0.0, at - began))
+        self._report(name, guard, situation, fault, None if at is None else max(0.0, at - began))
 
     def _refused_at_end(self, guarded: Guarded) -> None:
         fault = self._refuses(guarded)
@@ -400,8 +424,9 @@ class _Round:
 
     def _socket(self, guarded: Guarded) -> ClientConnection:
         address = f"127.0.0.1:{self._rig.port}"
-        origin = Origin(f"http://{address}")
-        return connect(f"ws://{address}/widgets/{guarded.control.id}/hold", origin=origin, proxy=None)
+        path = f"{self._rig.root}/widgets/{guarded.control.id}/hold"
+        headers, origin = {"cookie": self._rig.cookie}, Origin(f"http://{address}")
+        return connect(f"ws://{address}{path}", origin=origin, proxy=None, additional_headers=headers)
 
     def _begin_refused(self, guarded: Guarded) -> str:
         with self._socket(guarded) as socket:
@@ -469,7 +494,7 @@ class _Round:
         elif end == "page_gone":
             socket.close()
         elif interlock is not None:
-            self._robot.forbid(interlock, guarded.guards)
+            self._robots.forbid(interlock, guarded.guards)
             with suppress(ConnectionClosed):  # the finger stays on it
                 self._beat(socket, held, 2 * STOPPED_WITHIN_S)
         return self._stopped(str(getattr(guarded.control, "topic", "")), began)
@@ -509,13 +534,15 @@ class _Round:
             return ""
         row = self._alarm_row(str(alarm.id))
         body = {"occurrence": row.get("occurrence", 0)}
-        status, answer = self._rig.request("POST", f"/alarms/{alarm.id}/acknowledge", body)
+        status, answer = self._rig.request(
+            "POST", f"/alarms/{alarm_key(str(alarm.id), self._robot_name)}/acknowledge", body
+        )
         done = status == 200 and self._alarm_row(str(alarm.id)).get("acknowledged") is True
         return "" if done else f"it can't be acknowledged: {answer}"
 
     def _alarm_row(self, name: str) -> dict[str, Any]:
         rows = self._rig.request("GET", "/alarms")[1].get("alarms", [])
-        return next((row for row in rows if row["id"] == name), {})
+        return next((row for row in rows if row["id"] == alarm_key(name, self._robot_name)), {})
 
     def _alarm_state(self, name: str) -> str:
         return str(self._alarm_row(name).get("state", ""))
@@ -551,7 +578,8 @@ class _Round:
         kind: str = "control",
     ) -> None:
         shown = self._rig.shown.reasons(name) if kind == "control" else ""
-        self._tell(Result(kind, name, guard, situation, fault, took_s, shown))
+        robot = self._robot_name
+        self._tell(Result(kind, name, guard, situation, fault, took_s, shown, robot))
 
 
 def names_of(control: Command) -> frozenset[str]:

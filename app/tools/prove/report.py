@@ -27,6 +27,7 @@ SITUATIONS: Final[Mapping[str, str]] = {
     "old": "older than max_age_s",
     "other_type": "published with another type",
     "publisher_gone": "its publisher is gone",
+    "robot_lost": "its robot is lost",
     "link_cut": "the link to the robot is cut",
     "no_control": "another page has control",
     "no_role": "without a role",

@@ -27,13 +27,14 @@ from app.cell.session.assembly import open_fleet, open_log
 from app.cell.session.doctor_process import DoctorProcess
 from app.panel import Panel
 from app.panel.checks.look import page_parts
+from app.panel.condition import Interlock
 from app.panel.model import RobotEntry
 from app.panel.roles import ENGINEER
 from app.panel.rules import AccessRules
 from app.ros.messages import load_interfaces
 from app.system.errors import KioskError
 from app.system.settings import Settings, shipped_path
-from app.tools.prove.robot import ProvingRobot
+from app.tools.prove.robot import ProvingRobots
 from app.tools.prove.shown import Shown, read_events
 from app.tools.simulator.zenoh import ANY_PORT, Simulator, way_of
 from app.web.app_state import AppState
@@ -58,12 +59,12 @@ class Rig:
     """A running panel with its proving robot. Used by the thread of one round of the proof."""
 
     panel: Panel
-    robot: ProvingRobot
+    robots: ProvingRobots
     data: Path
     shown: Shown = field(default_factory=Shown)
     port: int = 0  # any that is free
-    simulator: Simulator | None = None
-    _simulating: ExitStack = field(default_factory=ExitStack)
+    _simulators: dict[str, Simulator] = field(default_factory=dict)
+    _simulating: dict[str, ExitStack] = field(default_factory=dict)
     _state: AppState | None = None
     _loop: asyncio.AbstractEventLoop | None = None
     _server: uvicorn.Server | None = None
@@ -71,7 +72,12 @@ class Rig:
     _ends: threading.Event = field(default_factory=threading.Event)
     _fault: BaseException | None = None
     _pressed_at: float = 0.0
-    _cookie: str = ""
+    cookie: str = ""
+
+    @property
+    def root(self) -> str:
+        """Below which the paths of the proved robot stand."""
+        return f"/robots/{self.robots.name}" if self.robots.name else ""
 
     # Start and end.
 
@@ -86,9 +92,9 @@ class Rig:
             if time.monotonic() > end:
                 raise KioskError("the panel did not start in time")
             time.sleep(POLL_S)
-        self._cookie = self._new_cookie()
+        self.cookie = self._new_cookie()
         if self.panel.control.required:
-            self.request("POST", "/control/take", {"id": secrets.token_hex(8)})
+            self.request("POST", f"{self.root}/control/take", {"id": secrets.token_hex(8)})
             holding = threading.Thread(target=self._keep_control, name="prove-control", daemon=True)
             self._threads.append(holding)
             holding.start()
@@ -151,17 +157,24 @@ class Rig:
     @contextmanager
     def _simulate(self, panel: Panel, entry: RobotEntry | None) -> Iterator[str]:
         """The robot as `open_fleet` starts it."""
+        name = str(entry.id) if entry else ""
         namespace = entry.namespace if entry else panel.namespace
         interfaces = load_interfaces(panel.distro, panel.interfaces)
         ways = {namespace: way_of(panel, entry or panel)}
-        with self._simulating:
-            simulator = Simulator(ANY_PORT, {namespace: self.robot}, interfaces, ways=ways)
-            self.simulator = self._simulating.enter_context(simulator)
+        with ExitStack() as stack:
+            simulator = Simulator(ANY_PORT, {namespace: self.robots[name]}, interfaces, ways=ways)
+            self._simulators[name] = stack.enter_context(simulator)
+            self._simulating[name] = stack
             yield simulator.endpoint
 
-    def cut(self) -> None:
-        """The link to the robot is cut."""
-        self._simulating.close()
+    def cut(self, robot: str = "") -> None:
+        """The link to a robot, by its id, is cut."""
+        self._simulating[robot].close()
+
+    def announce(self, interlock: Interlock, type_name: str = "", *, gone: bool = False) -> None:
+        """See `Simulator.announce`, of the robot that publishes it."""
+        simulator = self._simulators[self.robots.name_for(interlock)]
+        simulator.announce(interlock.topic, type_name, gone=gone)
 
     def shut_down(self) -> None:
         """The server begins to end: it still answers."""
@@ -185,7 +198,7 @@ class Rig:
         time.sleep(max(0.0, self._pressed_at + PACE_S - time.monotonic()))
         self._pressed_at = time.monotonic()
         body = {"inputs": dict(inputs), "id": secrets.token_hex(8)}
-        return self.request("POST", f"/widgets/{control}", body)
+        return self.request("POST", f"{self.root}/widgets/{control}", body)
 
     def request(
         self, method: str, path: str, body: Mapping[str, Any] | None = None, cookie: str = ""
@@ -195,7 +208,7 @@ class Rig:
         try:
             headers = {
                 "accept": "application/json", "content-type": "application/json",
-                "cookie": cookie or self._cookie,
+                "cookie": cookie or self.cookie,
             }  # fmt: skip
             connection.request(method, path, json.dumps(body) if body is not None else None, headers)
             answer = connection.getresponse()
@@ -209,32 +222,33 @@ class Rig:
 
     def _new_cookie(self) -> str:
         """The cookie of a client that has not been here yet."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
-        try:
-            connection.request(
-                "GET", "/", headers={"accept": "text/html", "sec-fetch-dest": "document"}
-            )
-            answer = connection.getresponse()
-            answer.read()
-            return "; ".join(each.partition(";")[0] for each in answer.msg.get_all("set-cookie", []))
-        finally:
-            connection.close()
+        headers, path = {"accept": "text/html", "sec-fetch-dest": "document"}, "/"
+        while path:  # of several robots it leads to the first
+            connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
+            try:
+                connection.request("GET", path, headers=headers)
+                answer = connection.getresponse()
+                answer.read()
+            finally:
+                connection.close()
+            path = answer.getheader("location", "")
+        return "; ".join(each.partition(";")[0] for each in answer.msg.get_all("set-cookie", []))
 
     @contextmanager
     def as_stranger(self) -> Iterator[None]:
         """Requests within the block are those of another client."""
-        own, self._cookie = self._cookie, self._new_cookie()
+        own, self.cookie = self.cookie, self._new_cookie()
         try:
             yield
         finally:
-            self._cookie = own
+            self.cookie = own
 
     def _keep_control(self) -> None:
         """As the page of a holder that is touched."""
-        own = self._cookie
+        own = self.cookie
         while not self._ends.wait(KEPT_EVERY_S):
             with suppress(OSError, http.client.HTTPException):
-                self.request("POST", "/control/here", {"touched": True}, own)
+                self.request("POST", f"{self.root}/control/here", {"touched": True}, own)
 
     def _read_events(self) -> None:
         while not self._ends.is_set():
@@ -245,7 +259,7 @@ class Rig:
     def _read_stream(self) -> None:
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         try:
-            connection.request("GET", "/events", headers={"cookie": self._cookie})
+            connection.request("GET", f"{self.root}/events", headers={"cookie": self.cookie})
             for event in read_events(iter(connection.getresponse().readline, b"")):
                 if self._ends.is_set():
                     break

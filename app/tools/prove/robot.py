@@ -11,6 +11,7 @@ from typing import Any, Final
 from app.panel.alarm import Alarm
 from app.panel.condition import Condition, Interlock
 from app.panel.model import Panel
+from app.panel.robot_panels import panel_of
 from app.panel.widgets.publish import Step
 from app.ros.messages import Interfaces, load_interfaces
 from app.ros.messages.definitions import FLOAT_TYPES
@@ -40,8 +41,9 @@ class Judged:
 class ProvingRobot:
     """See `SimulatedRobot`. Stepped by the simulator's thread; the proof sets it under `lock`."""
 
-    panel: Panel
+    panel: Panel  # of this robot
     number: int = 0
+    name: str = ""  # its id, where the panel has several
     lock: threading.Lock = field(default_factory=threading.Lock)
     arrived: Counter[str] = field(default_factory=Counter)  # by topic, service or action
     arrived_at: dict[str, float] = field(default_factory=dict)  # the last, in monotonic seconds
@@ -51,10 +53,10 @@ class ProvingRobot:
         self._interfaces: Interfaces = load_interfaces(self.panel.distro, self.panel.interfaces)
         types = self.panel.subscriptions()
         self._judged: dict[Field, Judged] = {}
-        for key, conditions in judged_fields(self.panel).items():
+        for key, conditions in judged_fields(self.panel, self.name).items():
             self._judged[key] = self._judge(key, types[key[0]], conditions)
         for alarm in self.panel.alarms:
-            if provable(alarm):
+            if provable(alarm) and alarm.is_for(self.name or None):
                 self._add_alarm(alarm, types)
         for step in self.panel.widgets():
             if isinstance(step, Step):  # it steps from the value that is reported
@@ -186,6 +188,40 @@ class ProvingRobot:
             payload = self._interfaces.encode(type_name, fields)
             self._sent[topic] = moment.t, payload
             yield topic, payload
+
+
+class ProvingRobots:
+    """The robots of a panel, of which `own` is proved: what guards its controls may be of others."""
+
+    def __init__(self, panel: Panel, robot: str) -> None:
+        """`robot` is the id of the one that is proved, "" for the only one."""
+        self.names = [str(entry.id) for entry in panel.robots] or [""]
+        self._robots = {
+            name: ProvingRobot(panel_of(panel, name or None), number, name)
+            for number, name in enumerate(self.names)
+        }
+        self.name = robot
+        self.own = self._robots[robot]
+
+    def __getitem__(self, name: str) -> ProvingRobot:
+        return self._robots[name]
+
+    def name_for(self, interlock: Interlock) -> str:
+        """The id of the robot that publishes it."""
+        return interlock.robot or self.name
+
+    def permit(self, chosen: Iterable[Interlock], together: Collection[str] = ()) -> None:
+        ordered = [*chosen]
+        for name, robot in self._robots.items():
+            robot.permit([each for each in ordered if self.name_for(each) == name], together)
+
+    def forbid(self, interlock: Interlock, together: Collection[str] = ()) -> None:
+        self._robots[self.name_for(interlock)].forbid(interlock, together)
+
+    def silence(self, interlocks: Iterable[Interlock]) -> None:
+        """Their topics are not published."""
+        for interlock in interlocks:
+            self._robots[self.name_for(interlock)].silence([interlock.topic])
 
 
 class CountedAction:

@@ -17,7 +17,7 @@ OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of the
 AT_THE_END: Final = "the server's last moments are too short to watch: proved on the simulated robot"
 # In the order in which they are made at a machine: what needs a restart is last.
 AT_MACHINE: Final[Sequence[Situation]] = (
-    "permits", "forbids", "old", "publisher_gone", "other_type", "never_seen",
+    "permits", "forbids", "old", "publisher_gone", "other_type", "robot_lost", "never_seen",
 )  # fmt: skip
 HOW_ENDED: Final[Mapping[str, str]] = {
     "released": "release it",
@@ -52,7 +52,7 @@ def steps_of(panel: Panel, plan: Plan, *, has_users: bool) -> Iterator[Step]:
     """The steps of a panel's plan; `has_users`: its clients have roles."""
     for name in (each for chosen in plan.rounds for each in chosen):
         own = [guarded for guarded in plan.controls.values() if name.id in guarded.guards]
-        possible = {*situations(name)}
+        possible = {*situations(name, plan.robot)}
         for situation in AT_MACHINE:
             if situation in possible:
                 yield _of_interlock(name, situation, own)
@@ -86,10 +86,13 @@ def _of_interlock(interlock: Interlock, situation: Situation, own: Sequence[Guar
         "publisher_gone": f"{restored}. Then end the node that publishes {topic}.",
         "other_type": f"{restored}. Then end the node that publishes {topic}, and publish the topic"
         f" with another type: ros2 topic pub {topic} {other}.",
+        "robot_lost": f"{restored}. Then unplug the network cable of the robot {interlock.robot}.",
         "never_seen": f"{restored}. Then end the node that publishes {topic}, and restart the panel's"
         " server.",
     }[situation]
     must = f'Each is locked, with a reason that names "{name}".'
+    if situation == "robot_lost":
+        must = "Each is locked, with a reason that names the robot."
     return Step(
         f"interlock/{interlock.id}/{situation}",
         f"interlock {interlock.id}, {situation}",

@@ -36,6 +36,7 @@ class PanelWatch:
     ) -> None:
         """`robot` is the id of one of several robots, `robot_name` its name in the log."""
         self._client = client
+        self.robot = robot
         self._root = f"/robots/{robot}" if robot else ""
         self._robot_name = robot_name
         self.shown = Shown()

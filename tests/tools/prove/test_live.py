@@ -13,7 +13,7 @@ from app.tools.prove.cases import plan_of
 from app.tools.prove.proof import _Round
 from app.tools.prove.report import canonical
 from app.tools.prove.rig import Rig
-from app.tools.prove.robot import ProvingRobot
+from app.tools.prove.robot import ProvingRobots
 from app.tools.prove.steps import steps_of
 from tests.tools.prove.person import Person
 from tests.tools.prove.test_prove import PANEL
@@ -49,7 +49,7 @@ def horn(tmp_path: Path) -> Path:
 @pytest.fixture
 def rig(horn: Path, tmp_path: Path) -> Iterator[Rig]:
     panel = load_panel(horn)
-    with Rig(panel, ProvingRobot(panel), tmp_path / "data") as running:
+    with Rig(panel, ProvingRobots(panel, ""), tmp_path / "data") as running:
         yield running
 
 
@@ -65,16 +65,15 @@ class Operator:
     def __init__(self, panel: Panel, folder: Path) -> None:
         self.plan = plan_of(panel)
         self.steps = {step.title: step for step in steps_of(panel, self.plan, has_users=False)}
-        self.at = _Round(panel, self.plan, folder, lambda _: None, looks=False)
+        self.at = _Round(panel, "", self.plan, folder=folder, tell=lambda _: None, looks=False)
         self.rig, self.robot = self.at._rig, self.at._robot
 
     def does(self, title: str, person: Person) -> None:
         kind, *names = self.steps[title].key.split("/")
         interlocks = [*self.plan.interlocks.values()]
         self.robot.permit(interlocks, {*self.plan.interlocks})
-        assert self.rig.simulator is not None
         for each in interlocks:  # the step before may have announced it otherwise
-            self.rig.simulator.announce(each.topic)
+            self.rig.announce(each)
         if kind == "interlock":
             self._changes(names[0], names[1], person)
         elif kind == "press":
@@ -94,8 +93,7 @@ class Operator:
         assert self.rig.shown.wait(lambda: not self.rig.shown.is_locked(control), 20) is not None
 
     def _changes(self, guard: str, situation: str, person: Person) -> None:
-        interlock, simulator = self.plan.interlocks[guard], self.rig.simulator
-        assert simulator is not None
+        interlock = self.plan.interlocks[guard]
         if situation == "permits":
             return
         person.hears(f'"{interlock.label}" permits')
@@ -105,7 +103,7 @@ class Operator:
             self.robot.silence([interlock.topic])
         else:
             gone = situation == "publisher_gone"
-            simulator.announce(interlock.topic, "std_msgs/msg/Int8", gone=gone)
+            self.rig.announce(interlock, "std_msgs/msg/Int8", gone=gone)
 
     def _raises(self, name: str) -> None:
         alarm = next(each for each in self.plan.alarms if each.id == name)
@@ -233,7 +231,7 @@ def test_another_panel_file_begins_again(horn: Path, rig: Rig, people: ExitStack
     assert other.ends() == 2
     assert "the server shows another panel file" in other.said
     panel = load_panel(horn)
-    with Rig(panel, ProvingRobot(panel), horn.parent / "other") as changed:
+    with Rig(panel, ProvingRobots(panel, ""), horn.parent / "other") as changed:
         person = sit(people, horn, changed)
         person.hears("each case begins again")
         assert person.step() == 'control horn ("Whistle"), press'
@@ -246,20 +244,20 @@ def test_a_panel_file_that_changes_under_a_step_ends_it(
     horn: Path, people: ExitStack, tmp_path: Path
 ) -> None:
     panel = load_panel(horn)
-    with Rig(panel, ProvingRobot(panel), tmp_path / "data") as rig:
+    with Rig(panel, ProvingRobots(panel, ""), tmp_path / "data") as rig:
         person = sit(people, horn, rig)
         person.step()
     changed = tmp_path / "changed.toml"
     changed.write_text(HORN.replace('"Horn"', '"Whistle"'))
     other = load_panel(changed)
-    with Rig(other, ProvingRobot(other), tmp_path / "data", port=rig.port):
+    with Rig(other, ProvingRobots(other, ""), tmp_path / "data", port=rig.port):
         assert person.ends() == 2
     assert f"shows another panel file now ({other.revision}" in person.said
 
 
 def test_two_persons_and_a_lost_server(horn: Path, people: ExitStack, tmp_path: Path) -> None:
     panel = load_panel(horn)
-    with Rig(panel, ProvingRobot(panel), tmp_path / "data") as rig:
+    with Rig(panel, ProvingRobots(panel, ""), tmp_path / "data") as rig:
         first = sit(people, horn, rig)
         first.step()
         second = sit(people, horn, rig, by="A. Weber")
@@ -268,7 +266,7 @@ def test_two_persons_and_a_lost_server(horn: Path, people: ExitStack, tmp_path: 
     first.hears("server: ")
     first.types("t")
     first.hears("Not now: the panel's server can't be read")
-    with Rig(panel, ProvingRobot(panel), tmp_path / "data", port=rig.port) as again:
+    with Rig(panel, ProvingRobots(panel, ""), tmp_path / "data", port=rig.port) as again:
         first.hears("it answers again")
         assert finish(first, again) == 0
     gone = sit(people, horn, rig)
@@ -284,7 +282,7 @@ def test_without_an_engineers_token_it_says_so(horn: Path, people: ExitStack, tm
     add_user(data, "M. Sato", "engineer", pin="2580")
     token = tmp_path / "token"
     token.write_text(token_of(data, "proof", "engineer"))
-    with Rig(panel, ProvingRobot(panel), data) as rig:
+    with Rig(panel, ProvingRobots(panel, ""), data) as rig:
         without = sit(people, horn, rig)
         assert without.ends() == 2
         assert "an engineer's token is needed" in without.said

@@ -180,9 +180,72 @@ def test_a_panel_that_can_not_be_used_is_named(
     assert "cell.toml" in capsys.readouterr().err
 
 
-def test_several_robots_are_not_proved_yet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    robots = '[[robot]]\nid = "a"\nname = "A"\nnamespace = "/a"\n'
+ROBOTS = """
+title = "Cell"
+language = "en"
+control = { required = true }
+[[robot]]
+id = "left"
+name = "Left"
+namespace = "/left"
+[[robot]]
+id = "right"
+name = "Right"
+namespace = "/right"
+[[interlock]]
+id = "door"
+label = "Door"
+topic = "/door"
+max_age_s = 0.6
+[[interlock]]
+id = "left_clear"
+label = "Left is out of the way"
+topic = "/clear"
+robot = "left"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "jog"
+kind = "hold"
+label = "Jog"
+topic = "/jog"
+type = "std_msgs/msg/Float64"
+message = { data = 1.0 }
+release = { data = 0.0 }
+interlock = "door"
+[[page]]
+id = "right_only"
+title = "Right"
+robot = "right"
+[[page.widget]]
+id = "weld"
+kind = "publish"
+label = "Weld"
+topic = "/weld"
+type = "std_msgs/msg/Empty"
+message = {}
+interlock = ["door", "left_clear"]
+[[alarm]]
+id = "hot"
+topic = "/temperature"
+type = "std_msgs/msg/Float64"
+text = "Too hot"
+high = 80.0
+"""
+
+
+def test_each_of_several_robots_is_proved_with_the_interlocks_of_others(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
-    path.write_text(PANEL.replace("[[interlock]]", f"{robots}[[interlock]]", 1))
-    assert main([str(path)]) == 2
-    assert "several robots" in capsys.readouterr().err
+    path.write_text(ROBOTS)
+    proof = proved(load_panel(path))
+    assert [tuple(result) for result in proof.faults] == []
+    assert proof.left_out == {}
+    rows = {(row.robot, row.name, row.guard, row.situation): row for row in proof.results}
+    assert "Left is out of the way" in rows["right", "weld", "left_clear", "forbids"].shown
+    assert ("left", "weld", "", "link_cut") not in rows
+    assert "Left" in rows["right", "weld", "left_clear", "robot_lost"].shown
+    for robot in ("left", "right"):
+        assert "Door is older" in rows[robot, "jog", "door", "old"].shown
+        assert (robot, "hot", "", "raised") in rows
+        assert (robot, "jog", "", "released") in rows
