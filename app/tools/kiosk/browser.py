@@ -328,6 +328,12 @@ class Browser:
         with suppress(NoResponse):
             await self._call("Page.navigate", session=self._session, url=url)
 
+    async def set_cookies(self, url: str, cookies: Mapping[str, str]) -> None:
+        """The pages of an address have these cookies from now on."""
+        for name, value in cookies.items():
+            call = self._call("Network.setCookie", self._session, name=name, value=value, url=url)
+            await call
+
     async def ignore_input(self, ignore: bool) -> None:
         """Whether touches and keys reach no page."""
         with suppress(DevToolsError):

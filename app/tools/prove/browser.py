@@ -4,7 +4,7 @@ import asyncio
 import os
 import threading
 import time
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -71,14 +71,15 @@ class PageView:
         self._thread.join(ANSWER_WITHIN_S)
         self._loop.close()
 
-    def open(self, url: str) -> None:
-        """Opens a page, unless it is open."""
+    def open(self, url: str, cookie: str) -> None:
+        """Opens a page, unless it is open, as the client with this cookie."""
         if url == self._url:
             return
-        if self._url:
-            self._run(self._browser.open(url))
-        else:
-            self._run(self._browser.start(url, self._env))
+        if not self._url:
+            self._run(self._browser.start("about:blank", self._env))
+            cookies = dict(each.split("=", 1) for each in cookie.split("; ") if each)
+            self._run(self._browser.set_cookies(url, cookies))
+        self._run(self._browser.open(url))
         self._url = url
 
     def seen(self, control: str) -> Seen:
@@ -91,10 +92,10 @@ class PageView:
             return Seen(None, "")
         return Seen(bool(seen["locked"]) if seen["count"] else None, str(seen["text"]))
 
-    def shows(self, control: str, *, locked: bool, within_s: float) -> Seen:
-        """The same as soon as it shows the control so, or at the end of the time."""
+    def shows(self, control: str, is_right: Callable[[Seen], bool], within_s: float) -> Seen:
+        """The same as soon as it is right, or at the end of the time."""
         end = time.monotonic() + within_s
-        while (seen := self.seen(control)).locked is not locked and time.monotonic() < end:
+        while not is_right(seen := self.seen(control)) and time.monotonic() < end:
             time.sleep(POLL_S)
         return seen
 

@@ -8,15 +8,17 @@ from typing import Final, Literal, NamedTuple
 from app.panel.alarm import Alarm
 from app.panel.condition import Condition, Interlock
 from app.panel.model import Panel
+from app.panel.roles import MAINTENANCE, ROLES, VIEWER
 from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
-from app.panel.widgets.key_parts import confirmation_of
+from app.panel.widgets.key_parts import Confirmation, confirmation_of
 from app.panel.widgets.recipe_load import RecipeLoad
 from app.system.texts.text import each_language
 
 Situation = Literal[
     "permits", "forbids", "never_seen", "old", "other_type", "publisher_gone", "robot_lost",
     "link_cut", "no_control", "no_role", "shutdown",
+    "role_enough", "role_less", "unconfirmed", "wrong_pin", "same_person",
 ]  # fmt: skip
 # Those of one interlock, in the order in which they are made.
 OF_INTERLOCK: Final[Sequence[Situation]] = (
@@ -25,6 +27,13 @@ OF_INTERLOCK: Final[Sequence[Situation]] = (
 HoldEnd = Literal["released", "page_gone", "no_beat", "forbids", "link_cut"]
 HOLD_ENDS: Final[Sequence[HoldEnd]] = ("released", "page_gone", "no_beat", "forbids")
 Field = tuple[str, str]  # topic, path
+
+
+class Persona(NamedTuple):
+    """A user of the proof by the role and the groups of the panel."""
+
+    role: str
+    groups: frozenset[str] = frozenset()
 
 
 class Case(NamedTuple):
@@ -51,10 +60,31 @@ class HoldCase(NamedTuple):
 
 @dataclass(frozen=True)
 class Guarded:
-    """A control with the ids of the interlocks that guard it."""
+    """A control with the ids of the interlocks that guard it, and the roles and groups that a press
+    needs."""
 
     control: Command
     guards: frozenset[str]
+    needs: frozenset[str] = frozenset()
+
+    @property
+    def confirmation(self) -> Confirmation:
+        """By whom a press is confirmed, "" for no one."""
+        return confirmation_of(self.control)
+
+    @property
+    def enough(self) -> Persona:
+        """The user with the least that may press it."""
+        needed = [role for role in ROLES if role in self.needs] or [VIEWER]
+        return Persona(needed[-1], self.needs - {*ROLES})
+
+    @property
+    def less(self) -> Persona | None:
+        """The user with the most that lacks something; None if everyone may press it."""
+        if self.needs - {*ROLES}:
+            return Persona(MAINTENANCE)
+        below = ROLES.index(self.enough.role) - 1
+        return Persona(ROLES[below]) if below >= 0 else None
 
 
 @dataclass(frozen=True)
@@ -68,6 +98,17 @@ class Plan:
     rounds: Sequence[Sequence[Interlock]]
     alarms: Sequence[Alarm]
     left_out: Mapping[str, str]  # control or alarm → why it is not proved
+
+    @property
+    def confirmed(self) -> Sequence[Guarded]:
+        """The controls whose press a person confirms."""
+        return [guarded for guarded in self.controls.values() if guarded.confirmation]
+
+    @property
+    def personas(self) -> Sequence[Persona]:
+        """The users who are needed to try the roles of all controls."""
+        users = [user for guarded in self.controls.values() for user in (guarded.enough, guarded.less)]
+        return list(dict.fromkeys(user for user in users if user is not None))
 
     def cases(self) -> Iterator[Case]:
         """Each case of a control, once."""
@@ -109,12 +150,11 @@ def plan_of(panel: Panel, robot: str = "") -> Plan:
     controls: dict[str, Guarded] = {}
     for widget in panel.commands:
         guards = frozenset(widget.interlocks)
-        if confirmation_of(widget):
-            left_out[str(widget.id)] = "a person confirms it with a PIN"
-        elif isinstance(widget, RecipeLoad):
+        if isinstance(widget, RecipeLoad):
             left_out[str(widget.id)] = "a recipe is chosen on its page"
         else:
-            controls[str(widget.id)] = Guarded(widget, guards)
+            needs = panel.needs.commands.get(widget.id, frozenset())
+            controls[str(widget.id)] = Guarded(widget, guards, needs)
     used = {guard for guarded in controls.values() for guard in guarded.guards}
     alarms = []
     for alarm in panel.alarms:

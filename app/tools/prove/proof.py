@@ -9,7 +9,7 @@ import json
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from functools import partial
@@ -35,10 +35,11 @@ from app.panel.widgets.switch import Switch
 from app.panel.widgets.templated import is_stop
 from app.records.entry import GOOD_OUTCOMES
 from app.system.texts import render
-from app.tools.prove.browser import PageView, has_browser
+from app.tools.prove.browser import PageView, Seen, has_browser
 from app.tools.prove.cases import (
     Guarded,
     HoldEnd,
+    Persona,
     Plan,
     Situation,
     alarm_key,
@@ -47,7 +48,7 @@ from app.tools.prove.cases import (
     situations,
 )
 from app.tools.prove.result import Proof, Result
-from app.tools.prove.rig import Rig, add_user
+from app.tools.prove.rig import HOLDER, Rig
 from app.tools.prove.robot import ProvingRobots
 
 AT_ONCE: Final = 3  # rounds
@@ -77,7 +78,7 @@ def prove(
             proof.results.append(result)
         on_result(result)
 
-    looks = bool(proof.browser) and not panel.control.required  # the proof's own client has control
+    looks = bool(proof.browser)
 
     def examine(robot: str, plan: Plan, chosen: Sequence[Interlock], folder: Path) -> None:
         """A round of interlocks, or without any the panel as a whole."""
@@ -86,8 +87,11 @@ def prove(
             make(folder=folder, looks=looks).interlocks(chosen)
         else:
             make(folder=folder / "whole", looks=looks).whole()
-            make(folder=folder / "roles", looks=False).roles()
             make(folder=folder / "ending", looks=False).ending()
+
+    def examine_roles(robot: str, plan: Plan, folder: Path) -> None:
+        users = plan.personas
+        _Round(panel, robot, plan, folder=folder, tell=tell, looks=False, users=users).roles()
 
     with (
         tempfile.TemporaryDirectory(prefix="operator-panel-proof-") as folder,
@@ -98,9 +102,11 @@ def prove(
             plan = plan_of(panel_of(panel, robot or None), robot)
             named = f"{robot}: " if robot else ""
             proof.left_out |= {f"{named}{name}": why for name, why in plan.left_out.items()}
-            for chosen in (*plan.rounds, ()):
-                place = Path(folder) / str(len(rounds))
-                rounds.append(pool.submit(examine, robot, plan, chosen, place))
+            place = Path(folder) / (robot or "only")
+            rounds.append(pool.submit(examine, robot, plan, (), place))  # the longest first
+            rounds.append(pool.submit(examine_roles, robot, plan, place / "roles"))
+            for number, chosen in enumerate(plan.rounds):
+                rounds.append(pool.submit(examine, robot, plan, chosen, place / str(number)))
         for examined in rounds:
             examined.result()  # what a round raises is raised here
     proof.took_s = time.monotonic() - began
@@ -119,15 +125,18 @@ class _Round:
         folder: Path,
         tell: Callable[[Result], None],
         looks: bool,
+        users: Sequence[Persona] = (),
     ) -> None:
         """`robot` is the id of the one that is proved, of several; `looks`: its pages are looked at in
-        a browser."""
+        a browser. The panel has `users`, and also without any where a person confirms a press."""
         self._robot_name = robot
         self._plan = plan
         self._tell = tell
         self._robots = ProvingRobots(panel, robot)
         self._robot = self._robots.own
-        self._rig = Rig(panel, self._robots, folder / "data")
+        if plan.confirmed:
+            users = (*users, HOLDER)
+        self._rig = Rig(panel, self._robots, folder / "data", users=users)
         self._panel = panel = panel_of(panel, robot or None)
         self._view = PageView(folder / "browser") if looks else None
         self._pages = {
@@ -314,8 +323,14 @@ class _Round:
         page = self._pages.get(name)
         if self._view is None or page is None:
             return ""
-        self._view.open(f"http://127.0.0.1:{self._rig.port}{self._rig.root}/pages/{page}")
-        seen = self._view.shows(name, locked=locked, within_s=BROWSER_WITHIN_S)
+        url = f"http://127.0.0.1:{self._rig.port}{self._rig.root}/pages/{page}"
+        self._view.open(url, self._rig.cookie)
+
+        def is_right(seen: Seen) -> bool:
+            is_named = interlock is None or names_interlock(seen.text, interlock)
+            return seen.locked is locked and is_named
+
+        seen = self._view.shows(name, is_right, BROWSER_WITHIN_S)
         if seen.locked is None:
             return ""
         if seen.locked is not locked:
@@ -324,10 +339,11 @@ class _Round:
             return f'what the browser says does not name "{render(interlock.name)}": {seen.text:.200}'
         return ""
 
-    def _refuses(self, guarded: Guarded) -> str:
-        """That the server refuses a press past the page, and that nothing is sent; "" if so."""
+    def _refuses(self, guarded: Guarded, confirmation: str | None = None) -> str:
+        """That the server refuses a press past the page, and that nothing is sent; "" if so. It goes
+        with this confirmation, or with one that is asked for."""
         before = self._arrived(guarded)
-        answer = self._press(guarded)
+        answer = self._press(guarded, confirmation=confirmation)
         time.sleep(QUIET_S)
         if self._arrived(guarded) != before:
             return f"something was sent to the robot though it is locked: {answer}"
@@ -347,17 +363,20 @@ class _Round:
         if fault := self._seen(name, locked=False):
             self._report(name, guard, "permits", fault, took_s)
             return
+        self._report(name, guard, "permits", self._arrives(guarded), took_s)
+
+    def _arrives(self, guarded: Guarded) -> str:
+        """That what a press sends arrives at the robot; "" if so."""
         if isinstance(guarded.control, HoldCommand):
-            self._report(name, guard, "permits", self._holds(guarded), took_s)
-            return
+            return self._holds(guarded)
         before = self._arrived(guarded)
         answer = self._press(guarded)
         if self._code == "switch_reported_already":
             answer = self._press(guarded, is_on=False)
         arrived = self._within(lambda: self._arrived(guarded) != before, SHOWN_WITHIN_S)
-        fault = "" if arrived else f"nothing arrived at the robot: {answer}, {self._said}"
-        self._rig.shown.wait(lambda: not self._rig.shown.widgets[name].get("busy"), ENDED_WITHIN_S)
-        self._report(name, guard, "permits", fault, took_s)
+        shown, name = self._rig.shown, str(guarded.control.id)
+        shown.wait(lambda: not shown.widgets.get(name, {}).get("busy"), ENDED_WITHIN_S)
+        return "" if arrived else f"nothing arrived at the robot: {answer}, {self._said}"
 
     def _leave_out(self, name: str, guard: str, reason: str) -> None:
         fault = f"it is locked while everything permits: {reason}"
@@ -368,19 +387,45 @@ class _Round:
         refuses, and nothing is sent. A stop needs neither."""
         with self._rig.as_stranger():
             for guarded in self._plan.controls.values():
-                if isinstance(guarded.control, HoldCommand):
-                    continue
-                if is_stop(guarded.control):
-                    continue
-                self._report(str(guarded.control.id), "", situation, self._refuses(guarded))
+                if not is_stop(guarded.control):
+                    self._report(str(guarded.control.id), "", situation, self._refuses(guarded))
 
     def roles(self) -> None:
-        """With users: a client that is not signed in presses each control."""
-        add_user(self._rig.data)
+        """With users: a client that is not signed in presses each control, then users with just the
+        role that it needs and with the one below. What a person confirms is confirmed wrongly."""
+        interlocks = [*self._plan.interlocks.values()]
         self._robots.permit(())
         with self._rig:
             self._await_link()
             self._without_right("no_role")
+            for guarded in self._plan.confirmed:
+                self._permit_for(guarded, interlocks)
+                self._unconfirmed(guarded)
+            for persona in self._plan.personas:
+                with self._rig.signed_in(persona):
+                    for guarded in self._plan.controls.values():
+                        if persona == guarded.enough:
+                            self._permit_for(guarded, interlocks)
+                            self._report(
+                                str(guarded.control.id), "", "role_enough", self._arrives(guarded)
+                            )
+                        elif persona == guarded.less:
+                            self._permit_for(guarded, interlocks)
+                            fault = self._refuses(guarded)
+                            self._report(str(guarded.control.id), "", "role_less", fault)
+
+    def _unconfirmed(self, guarded: Guarded) -> None:
+        """A press is refused without a confirmation, and with one that was not given."""
+        name, values = str(guarded.control.id), self._values(guarded)
+        confirm = partial(self._rig.confirm, name, values, guarded.confirmation)
+        tried: dict[Situation, Callable[[], str]] = {
+            "unconfirmed": lambda: "",
+            "wrong_pin": lambda: confirm(right=False),
+        }
+        if guarded.confirmation == "two_persons":
+            tried["same_person"] = lambda: confirm(second=HOLDER)
+        for situation, confirmation in tried.items():
+            self._report(name, "", situation, self._refuses(guarded, confirmation()))
 
     def _cut_off(self, guarded: Guarded, situation: Situation, began: float, guard: str = "") -> None:
         name = str(guarded.control.id)
@@ -395,18 +440,26 @@ class _Round:
 
     # Presses and holds.
 
-    def _press(self, guarded: Guarded, *, is_on: bool = True) -> str:
+    def _press(self, guarded: Guarded, *, is_on: bool = True, confirmation: str | None = None) -> str:
         """The outcome of a press past the page, or of the begin of a hold. A switch is set to
-        `is_on`."""
+        `is_on`; `confirmation` as in `_refuses`."""
         if isinstance(guarded.control, HoldCommand):
-            return self._begin_refused(guarded)
+            return self._begin_refused(guarded, confirmation)
         values = self._values(guarded)
         if isinstance(guarded.control, Switch):
             values[str(guarded.control.id)] = is_on
-        status, receipt = self._rig.press(str(guarded.control.id), values)
+        if confirmation is None:
+            confirmation = self._confirmed(guarded, values)
+        status, receipt = self._rig.press(str(guarded.control.id), values, confirmation)
         self._code = str(receipt.get("code", ""))
         self._said = f"{receipt.get('reason') or receipt.get('error') or ''} ({status})"
         return str(receipt.get("outcome", "")) or f"status {status}"
+
+    def _confirmed(self, guarded: Guarded, values: Mapping[str, Any]) -> str:
+        """The confirmation of a press with these values; "" where none is needed or given."""
+        if not guarded.confirmation:
+            return ""
+        return self._rig.confirm(str(guarded.control.id), values, guarded.confirmation)
 
     def _values(self, guarded: Guarded) -> dict[str, Any]:
         """Values of the inputs that a control sends."""
@@ -428,19 +481,25 @@ class _Round:
         headers, origin = {"cookie": self._rig.cookie}, Origin(f"http://{address}")
         return connect(f"ws://{address}{path}", origin=origin, proxy=None, additional_headers=headers)
 
-    def _begin_refused(self, guarded: Guarded) -> str:
+    def _begin_refused(self, guarded: Guarded, confirmation: str | None) -> str:
         with self._socket(guarded) as socket:
             try:
-                return "published" if self._begin(socket, guarded) else "refused"
+                begun = self._begin(socket, guarded, confirmation)
+                return "published" if begun else "refused"
             except ConnectionClosed:
                 return "refused"
 
-    def _begin(self, socket: ClientConnection, guarded: Guarded) -> dict[str, Any] | None:
-        """The answer to the begin of a hold: None if it is refused."""
-        stamp = json.loads(socket.recv(5))["stamp"]
+    def _begin(
+        self, socket: ClientConnection, guarded: Guarded, confirmation: str | None = None
+    ) -> dict[str, Any] | None:
+        """The answer to the begin of a hold: None if it is refused. `confirmation` as in
+        `_refuses`."""
+        stamp, values = json.loads(socket.recv(5))["stamp"], self._values(guarded)
+        if confirmation is None:
+            confirmation = self._confirmed(guarded, values)
         begin = {
-            "do": "begin", "inputs": self._values(guarded), "seen": self._rig.shown.event_id,
-            "stamp": stamp, "after": 1,
+            "do": "begin", "inputs": values, "seen": self._rig.shown.event_id,
+            "stamp": stamp, "after": 1, "confirmation": confirmation,
         }  # fmt: skip
         socket.send(json.dumps(begin))
         answer: dict[str, Any] = json.loads(socket.recv(5))

@@ -9,7 +9,7 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AsyncExitStack, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import uvicorn
+from fastapi import FastAPI
 
 from app.cell.commands.judge import PressLimits
 from app.cell.people.access import Access
@@ -30,10 +31,11 @@ from app.panel.checks.look import page_parts
 from app.panel.condition import Interlock
 from app.panel.model import RobotEntry
 from app.panel.roles import ENGINEER
-from app.panel.rules import AccessRules
+from app.panel.widgets.key_parts import Confirmation
 from app.ros.messages import load_interfaces
 from app.system.errors import KioskError
 from app.system.settings import Settings, shipped_path
+from app.tools.prove.cases import Persona
 from app.tools.prove.robot import ProvingRobots
 from app.tools.prove.shown import Shown, read_events
 from app.tools.simulator.zenoh import ANY_PORT, Simulator, way_of
@@ -43,14 +45,19 @@ from app.web.metrics import Metrics
 from app.web.pages.compiled_templates import COMPILED
 from app.web.pages.page_templates import PageTemplates
 from app.web.server import OPTIONS
+from app.web.session_end import follow_users
 
 log = logging.getLogger("kiosk.prove")
 
 STARTED_WITHIN_S: Final = 30.0
 ANSWER_WITHIN_S: Final = 10.0
 POLL_S: Final = 0.01
+REQUESTED: Final = ("alarms", "session")  # first segments of paths, beside what pages use
+LOADING: Final = threading.Lock()  # Pydantic builds the schema of a model in one thread at a time
 KEPT_EVERY_S: Final = 1.0
-QUICK: Final = Cost(8, 1)  # of a secret that no one has to know
+QUICK: Final = Cost(8, 1)  # of PINs that no one has to know
+HOLDER: Final = Persona(ENGINEER)  # the rig's own client, where the panel has users
+SECOND: Final = Persona(ENGINEER, frozenset({"second"}))  # confirms what takes two persons
 PACE_S: Final = 0.022  # between two presses: a client may press 50 times in a second
 
 
@@ -73,6 +80,11 @@ class Rig:
     _fault: BaseException | None = None
     _pressed_at: float = 0.0
     cookie: str = ""
+    users: Sequence[Persona] = ()  # with any, the rig's own client is signed in as an engineer
+    _client: str = ""  # the cookie of the rig's own client without a session
+    _held: str = ""  # the same with its session, also while `cookie` is a stranger's
+    _user: str = ""
+    _pins: dict[str, str] = field(default_factory=dict)  # of the users, by their names
 
     @property
     def root(self) -> str:
@@ -82,6 +94,8 @@ class Rig:
     # Start and end.
 
     def __enter__(self) -> "Rig":
+        if self.users:
+            self._add_users()
         serving = threading.Thread(target=self._serve, name="prove-server", daemon=True)
         self._threads.append(serving)
         serving.start()
@@ -92,9 +106,11 @@ class Rig:
             if time.monotonic() > end:
                 raise KioskError("the panel did not start in time")
             time.sleep(POLL_S)
-        self.cookie = self._new_cookie()
+        self.cookie = self._client = self._held = self._new_cookie()
+        if self.users:
+            self._sign_in(HOLDER)
         if self.panel.control.required:
-            self.request("POST", f"{self.root}/control/take", {"id": secrets.token_hex(8)})
+            self._take_control()
             holding = threading.Thread(target=self._keep_control, name="prove-control", daemon=True)
             self._threads.append(holding)
             holding.start()
@@ -134,7 +150,8 @@ class Rig:
             revision = page_revision(self.panel, assets)
             opened = open_fleet(settings, self.panel, revision, oplog, self._simulate, doctor)
             fleet = await stack.enter_async_context(opened)
-            access = Access(UsersFile(self.data), AccessRules(), oplog)
+            rules = self.panel.access.model_copy(update={"oidc": None, "idle_s": 0.0})
+            access = Access(UsersFile(self.data), rules, oplog)
             await access.reload()
             stack.callback(access.close)
             templates = PageTemplates(
@@ -142,9 +159,11 @@ class Rig:
             )
             metrics = Metrics(fleet, lambda: 0, lambda: limits.refused, lambda: {})
             self._state = AppState(fleet, assets, templates, metrics, oplog, limits, doctor, access)
-            app = new_application(settings, self.panel.embed)
-            app.state.app_state = self._state
-            await load_pages(app, self._state, self.panel)
+            await asyncio.to_thread(LOADING.acquire)
+            try:
+                app = await self._loaded_application(settings, self._state)
+            finally:
+                LOADING.release()
             listening = socket.create_server(("127.0.0.1", self.port))
             self.port = listening.getsockname()[1]
             config = uvicorn.Config(
@@ -153,6 +172,16 @@ class Rig:
             self._server = uvicorn.Server(config)
             await self._server.serve(sockets=[listening])
             fleet.close()
+
+    async def _loaded_application(self, settings: Settings, state: AppState) -> FastAPI:
+        """The application with all routes that the proof requests."""
+        app = new_application(settings, self.panel.embed)
+        app.state.app_state = state
+        follow_users(state)
+        await load_pages(app, state, self.panel)
+        for segment in REQUESTED:
+            await app.state.routes.load(segment)
+        return app
 
     @contextmanager
     def _simulate(self, panel: Panel, entry: RobotEntry | None) -> Iterator[str]:
@@ -193,22 +222,92 @@ class Rig:
 
     # What a client does.
 
-    def press(self, control: str, inputs: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:
+    def press(
+        self, control: str, inputs: Mapping[str, Any], confirmation: str = ""
+    ) -> tuple[int, dict[str, Any]]:
         """One press over HTTP, past the page: the status and the receipt."""
         time.sleep(max(0.0, self._pressed_at + PACE_S - time.monotonic()))
         self._pressed_at = time.monotonic()
-        body = {"inputs": dict(inputs), "id": secrets.token_hex(8)}
+        body: dict[str, Any] = {"inputs": dict(inputs), "id": secrets.token_hex(8)}
+        if confirmation:
+            body["confirmation"] = confirmation
         return self.request("POST", f"{self.root}/widgets/{control}", body)
+
+    def confirm(
+        self,
+        control: str,
+        inputs: Mapping[str, Any],
+        confirmation: Confirmation,
+        *,
+        right: bool = True,
+        second: Persona = SECOND,
+    ) -> str:
+        """The confirmation of a press by the user who is signed in, or by a second one, with the
+        `right` PIN or a wrong one; "" if it is refused."""
+        by = name_of(second) if confirmation == "two_persons" else self._user
+        pin = self._pins.get(by, "")
+        wrong = f"{(int(pin or 0) + 1) % 1_000_000:06}"
+        body = {"inputs": dict(inputs), "pin": pin if right else wrong}
+        if confirmation == "two_persons":
+            body["user"] = by
+        answer = self.request("POST", f"{self.root}/widgets/{control}/confirm", body)[1]
+        return str(answer.get("confirmation", ""))
+
+    @contextmanager
+    def signed_in(self, persona: Persona) -> Iterator[None]:
+        """The rig's own client is another user within the block."""
+        try:
+            self._sign_in(persona)
+            yield
+        finally:
+            self._sign_in(HOLDER)
+
+    def _sign_in(self, persona: Persona) -> None:
+        name = name_of(persona)
+        status, answer, cookies = self._exchange(
+            "POST", "/session", {"user": name, "pin": self._pins[name]}, self._client
+        )
+        if status != 200:
+            raise KioskError(f"{name} can't sign in: {answer}")
+        self.cookie = self._held = f"{self._client}; {cookies}"
+        self._user = name
+        if self.panel.control.required:
+            self._take_control()
+
+    def _take_control(self) -> None:
+        self.request("POST", f"{self.root}/control/take", {"id": secrets.token_hex(8)})
+
+    def _add_users(self) -> None:
+        """The users that the proof needs, with PINs that it knows."""
+
+        def edit(book: UserBook) -> UserBook:
+            for persona in dict.fromkeys((HOLDER, SECOND, *self.users)):
+                name = name_of(persona)
+                pin = self._pins[name] = f"{secrets.randbelow(1_000_000):06}"
+                user = User(name, persona.role, tuple(sorted(persona.groups)), hashed(pin, QUICK))
+                book = book.with_user(user, "proof").with_change(
+                    "proof", "add", name, persona.role, "proof"
+                )
+            return book
+
+        self.data.mkdir(mode=0o700, parents=True, exist_ok=True)
+        UsersFile(self.data).edit(edit)
 
     def request(
         self, method: str, path: str, body: Mapping[str, Any] | None = None, cookie: str = ""
     ) -> tuple[int, dict[str, Any]]:
         """A request with JSON; its status and its JSON, {} for another answer."""
+        return self._exchange(method, path, body, cookie or self.cookie)[:2]
+
+    def _exchange(
+        self, method: str, path: str, body: Mapping[str, Any] | None, cookie: str
+    ) -> tuple[int, dict[str, Any], str]:
+        """The same with the cookies that it sets."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
         try:
             headers = {
                 "accept": "application/json", "content-type": "application/json",
-                "cookie": cookie or self.cookie,
+                "cookie": cookie,
             }  # fmt: skip
             connection.request(method, path, json.dumps(body) if body is not None else None, headers)
             answer = connection.getresponse()
@@ -216,9 +315,9 @@ class Rig:
         finally:
             connection.close()
         try:
-            return answer.status, json.loads(text)
+            return answer.status, json.loads(text), cookies_of(answer)
         except ValueError:
-            return answer.status, {}
+            return answer.status, {}, cookies_of(answer)
 
     def _new_cookie(self) -> str:
         """The cookie of a client that has not been here yet."""
@@ -232,7 +331,7 @@ class Rig:
             finally:
                 connection.close()
             path = answer.getheader("location", "")
-        return "; ".join(each.partition(";")[0] for each in answer.msg.get_all("set-cookie", []))
+        return cookies_of(answer)
 
     @contextmanager
     def as_stranger(self) -> Iterator[None]:
@@ -245,10 +344,9 @@ class Rig:
 
     def _keep_control(self) -> None:
         """As the page of a holder that is touched."""
-        own = self.cookie
         while not self._ends.wait(KEPT_EVERY_S):
             with suppress(OSError, http.client.HTTPException):
-                self.request("POST", f"{self.root}/control/here", {"touched": True}, own)
+                self.request("POST", f"{self.root}/control/here", {"touched": True}, self._held)
 
     def _read_events(self) -> None:
         while not self._ends.is_set():
@@ -268,12 +366,11 @@ class Rig:
             connection.close()
 
 
-def add_user(folder: Path) -> None:
-    """The panel has a user from now on, so a client that is not signed in has no role."""
+def name_of(persona: Persona) -> str:
+    """The name of a user of the proof."""
+    return " ".join(["proof", persona.role, *sorted(persona.groups)])
 
-    def edit(book: UserBook) -> UserBook:
-        user = User("proof", ENGINEER, (), hashed(secrets.token_hex(8), QUICK), "", "")
-        return book.with_user(user, "proof").with_change("proof", "add", user.name, user.role, "proof")
 
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    UsersFile(folder).edit(edit)
+def cookies_of(answer: http.client.HTTPResponse) -> str:
+    """The cookies that an answer sets, as a request has them."""
+    return "; ".join(each.partition(";")[0] for each in answer.msg.get_all("set-cookie", []))

@@ -9,6 +9,7 @@ import pytest
 
 from app.cell.commands import holds, presses
 from app.cell.commands.judge import PressJudge
+from app.cell.people import access, confirmer
 from app.cell.permission import conditions, interlocks, press_permission
 from app.cell.permission.verdict import PERMITTED, Verdict
 from app.panel import Panel, load_panel
@@ -131,6 +132,97 @@ def test_wrong_code_does_not_hold(panel: Panel, monkeypatch: pytest.MonkeyPatch,
     where, name, instead = MUTANTS[mutant]
     monkeypatch.setattr(where, name, instead)
     assert proved(panel).faults
+
+
+CONFIRMED = """
+title = "Oven"
+language = "en"
+access = { groups = ["quality"] }
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "heat"
+kind = "publish"
+label = "Heat"
+topic = "/heat"
+type = "std_msgs/msg/Empty"
+message = {}
+confirm_press = "pin"
+[[page.widget]]
+id = "bypass"
+kind = "publish"
+label = "Bypass"
+topic = "/bypass"
+type = "std_msgs/msg/Empty"
+message = {}
+needs = "maintenance"
+confirm_press = "two_persons"
+[[page.widget]]
+id = "approve"
+kind = "publish"
+label = "Approve"
+topic = "/approve"
+type = "std_msgs/msg/Empty"
+message = {}
+needs = "quality"
+[[page.widget]]
+id = "jog"
+kind = "hold"
+label = "Jog"
+topic = "/jog"
+type = "std_msgs/msg/Float64"
+message = { data = 1.0 }
+release = { data = 0.0 }
+interlock = "door"
+confirm_press = "pin"
+[[interlock]]
+id = "door"
+label = "Door"
+topic = "/door"
+"""
+CONFIRMATIONS = {
+    ("heat", "unconfirmed"), ("heat", "wrong_pin"),
+    ("bypass", "unconfirmed"), ("bypass", "wrong_pin"), ("bypass", "same_person"),
+    ("jog", "unconfirmed"), ("jog", "wrong_pin"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def oven(tmp_path_factory: pytest.TempPathFactory) -> Panel:
+    path = tmp_path_factory.mktemp("oven") / "oven.toml"
+    path.write_text(CONFIRMED)
+    return load_panel(path)
+
+
+def test_roles_and_confirmations_are_tried_by_users_of_the_proof(oven: Panel) -> None:
+    proof = proved(oven)
+    assert [tuple(result) for result in proof.faults] == []
+    assert proof.left_out == {}
+    tried = {(row.name, row.situation) for row in proof.results}
+    assert tried >= CONFIRMATIONS
+    for control in ("heat", "bypass", "approve", "jog"):
+        assert {(control, "role_enough"), (control, "role_less"), (control, "no_role")} <= tried
+        assert (control, "permits") in tried
+
+
+# The same for roles and confirmations.
+OPEN_TO_ALL: dict[str, tuple[Any, str, Any]] = {
+    "a role is not judged": (press_permission, "role_verdict", always(None)),
+    "a press needs no confirmation": (press_permission, "unconfirmed", always(None)),
+    "any PIN is right": (access, "matches", always(True)),
+    "one person is two": (confirmer, "_same_person", always(None)),
+}
+
+
+@pytest.mark.long("table")
+@pytest.mark.parametrize("mutant", OPEN_TO_ALL)
+def test_who_may_press_does_not_hold_with_wrong_code(
+    oven: Panel, monkeypatch: pytest.MonkeyPatch, mutant: str
+) -> None:
+    where, name, instead = OPEN_TO_ALL[mutant]
+    monkeypatch.setattr(where, name, instead)
+    assert proved(oven).faults
 
 
 def test_the_command_reports_and_signs(
