@@ -1,7 +1,7 @@
 """The sources of alarms: a robot's state, and what the server sees of itself. Pure functions."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Any, Final, Literal, NamedTuple
 
@@ -69,12 +69,15 @@ def _read_field(alarm: Alarm, robot: RobotState, now: float, _: float) -> Source
 
 
 def _read_node(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
-    """A node is there while its parameter services are."""
     link = link_verdict(robot, now)
     if alarm.node is None or not (link.permitted or link.code == CATCHING_UP):
         return SourceReading(until=link.until)
-    key = robot.key(f"{alarm.node}/{GET[0]}")
-    return SourceReading(met=robot.graph.server_type("SS", key) is None)
+    return SourceReading(met=not has_node(robot, alarm.node))
+
+
+def has_node(robot: RobotState, node: str) -> bool:
+    """Whether a node is there: its parameter services are."""
+    return robot.graph.server_type("SS", robot.key(f"{node}/{GET[0]}")) is not None
 
 
 def _read_condition(alarm: Alarm, robot: RobotState, now: float, _: float) -> SourceReading:
@@ -133,8 +136,9 @@ READERS: Final[Mapping[SourceKind, Callable[[Alarm, RobotState, float, float], S
 }
 
 
-def link_state(robot: RobotState, now: float) -> tuple[Any, ...]:
-    """What the readings of all alarms of a robot depend on: if it differs, each may have changed."""
+def link_state(robot: RobotState, now: float, nodes: Iterable[str] = ()) -> tuple[Any, ...]:
+    """What the readings of all alarms of a robot depend on, with the `nodes` whose loss is an alarm: if
+    it differs, each may have changed."""
     graph = robot.graph
     link = link_verdict(robot, now).code
     is_permitted = link in ("permitted", CATCHING_UP)
@@ -144,6 +148,7 @@ def link_state(robot: RobotState, now: float) -> tuple[Any, ...]:
         graph.has_silent_peer,
         frozenset(graph.peers),
         "" if is_permitted else link,
+        *(has_node(robot, node) for node in nodes),
     )
 
 

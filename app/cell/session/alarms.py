@@ -375,7 +375,9 @@ class Alarms:
 
     def add_robot(self, robot_id: str, robot: RobotState) -> RobotAlarms:
         self.engine.add_robot(robot_id, robot)
-        robot_alarms = RobotAlarms(self.engine, robot_id, robot, self.evaluate)
+        own = (alarm for alarm in self._panel.alarms if alarm.is_for(robot_id or None))
+        nodes = sorted({alarm.node for alarm in own if alarm.node is not None})
+        robot_alarms = RobotAlarms(self.engine, robot_id, robot, self.evaluate, nodes)
         self._robots.append(robot_alarms)
         robot.alarmed = self._shown.marks.of_robot(robot_id)
         self._shown.selections.add_robot(robot_id, self._panel)

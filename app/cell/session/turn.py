@@ -134,9 +134,14 @@ class RobotAlarms:
     """The alarms of one robot. Used on the event loop only."""
 
     def __init__(
-        self, engine: AlarmEngine, robot_id: str, robot: RobotState, evaluate: Callable[[], None]
+        self,
+        engine: AlarmEngine,
+        robot_id: str,
+        robot: RobotState,
+        evaluate: Callable[[], None],
+        nodes: Sequence[str] = (),
     ) -> None:
-        """`evaluate` is called when alarms may be due."""
+        """`evaluate` is called when alarms may be due; `nodes` are those whose loss is an alarm."""
         self.evaluation_began = Signal[[]]()  # alarms are evaluated from now on
         self.rows_changed = Signal[[]]()  # the alarms that pages show have changed
         self.stopped = Signal[[]]()  # an alarm was raised that has a story of a stop
@@ -146,6 +151,7 @@ class RobotAlarms:
         self._engine = engine
         self._robot = robot
         self._evaluate = evaluate
+        self._nodes = nodes
         self._link: tuple[Any, ...] = ()
         self._locks: Mapping[str, Verdict] = {}
         self._locks_version = -1
@@ -153,7 +159,7 @@ class RobotAlarms:
     def update(self, topics: Collection[str]) -> None:
         """Messages arrived on topics with these keys, or something else has changed."""
         self._engine.topics_changed(self.robot_id, topics)
-        link = link_state(self._robot, time.monotonic())
+        link = link_state(self._robot, time.monotonic(), self._nodes)
         if link != self._link:
             self._link = link
             self._engine.robot_changed(self.robot_id)

@@ -3,6 +3,7 @@ to end a hold. Pure, and from the panel file alone: it shares no code with what 
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import Final, Literal, NamedTuple
 
 from app.panel.alarm import Alarm
@@ -12,7 +13,6 @@ from app.panel.roles import MAINTENANCE, ROLES, VIEWER
 from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.key_parts import Confirmation, confirmation_of
-from app.panel.widgets.recipe_load import RecipeLoad
 from app.system.texts.text import each_language
 
 Situation = Literal[
@@ -24,6 +24,8 @@ Situation = Literal[
 OF_INTERLOCK: Final[Sequence[Situation]] = (
     "never_seen", "permits", "forbids", "old", "other_type", "publisher_gone", "robot_lost",
 )  # fmt: skip
+MOST_WAITED_S: Final = 30.0  # for an alarm
+ENTRY: Final = "1"  # the code of an alarm that is an entry of a list: also a number
 HoldEnd = Literal["released", "page_gone", "no_beat", "forbids", "link_cut"]
 HOLD_ENDS: Final[Sequence[HoldEnd]] = ("released", "page_gone", "no_beat", "forbids")
 Field = tuple[str, str]  # topic, path
@@ -150,20 +152,19 @@ def plan_of(panel: Panel, robot: str = "") -> Plan:
     controls: dict[str, Guarded] = {}
     for widget in panel.commands:
         guards = frozenset(widget.interlocks)
-        if isinstance(widget, RecipeLoad):
-            left_out[str(widget.id)] = "a recipe is chosen on its page"
-        else:
-            needs = panel.needs.commands.get(widget.id, frozenset())
-            controls[str(widget.id)] = Guarded(widget, guards, needs)
+        needs = panel.needs.commands.get(widget.id, frozenset())
+        controls[str(widget.id)] = Guarded(widget, guards, needs)
     used = {guard for guarded in controls.values() for guard in guarded.guards}
     alarms = []
     for alarm in panel.alarms:
         if not alarm.is_for(robot or None):
             continue
-        if provable(alarm):
-            alarms.append(alarm)
+        if why := why_not_provable(alarm, panel):
+            left_out[f"alarm {alarm.id}"] = why
         else:
-            left_out[f"alarm {alarm.id}"] = f"alarms by {alarm.source} are not raised by a value"
+            alarms.append(alarm)
+        if alarm.confirm_act and alarm.ack == "required":
+            left_out[f"acknowledging alarm {alarm.id}"] = "a person confirms it with a PIN"
     chosen = [each for name, each in interlocks.items() if name in used]
     return Plan(robot, controls, interlocks, rounds(chosen, controls), tuple(alarms), left_out)
 
@@ -173,9 +174,32 @@ def alarm_key(name: str, robot: str) -> str:
     return f"{name}@{robot}" if robot else name
 
 
-def provable(alarm: Alarm) -> bool:
-    """Whether a value raises it."""
-    return alarm.source in ("limits", "condition") and alarm.suppressed_while is None
+def why_not_provable(alarm: Alarm, panel: Panel) -> str:
+    """Why an alarm can't be raised on the simulated robot; "" if it can."""
+    waits_s = alarm.on_delay_s + alarm.off_delay_s + (alarm.stale_s or 0.0)
+    if waits_s > MOST_WAITED_S:
+        return f"it takes {waits_s:g} s, and the proof waits for {MOST_WAITED_S:g} s at most"
+    judged = {interlock.topic for interlock in panel.every_interlock}
+    if alarm.suppressed_while is not None and alarm.suppressed_while.topic in judged:
+        return "what suppresses it is an interlock's topic too"
+    if alarm.source in ("diagnostics", "list"):
+        if alarm.topic_name in judged:
+            return "its topic is an interlock's too"
+        if not entry_of(alarm):
+            return "no name fits its patterns"
+    return ""
+
+
+def entry_of(alarm: Alarm) -> str:
+    """The name of an entry that raises an alarm which the robot publishes itself; "" if there is none,
+    and for other alarms."""
+    if alarm.listed is not None:
+        return ENTRY
+    for pattern in alarm.diagnostics or ():
+        name = pattern.replace("*", ENTRY)
+        if fnmatchcase(name, pattern):
+            return name
+    return ""
 
 
 def rounds(

@@ -2,10 +2,11 @@
 entries of its log, and kept once it was so."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from app.panel.condition import Interlock
 from app.panel.model import Panel
@@ -36,6 +37,7 @@ class Measure:
     _locked_from: float = inf  # seconds since 1970 of the server's clock
     _locked_until: float = inf
     _is_armed: bool = False  # it was seen as it is before the situation
+    _entry: str = ""  # of an alarm
     _passed: list[str] = field(default_factory=list)
 
     def look(self) -> None:
@@ -171,14 +173,20 @@ class Measure:
             return entry["outcome"] == "aborted" and names_interlock(entry["reason"], self._interlock())
         return entry["outcome"] == "aborted"
 
-    @property
-    def _alarm_key(self) -> str:
-        return alarm_key(self.row.name, self.watch.robot)
+    def _alarm_row(self) -> Mapping[str, Any]:
+        """The row of the alarm; of one that the robot publishes itself that of the first entry that was
+        raised."""
+        key, shown = alarm_key(self.row.name, self.watch.robot), self.watch.shown
+        if not self._entry:
+            entries = [name for name in shown.alarms.get("rows", {}) if name.startswith(f"{key}:")]
+            raised = [name for name in entries if shown.alarm(name).get("state") == "active"]
+            self._entry = raised[0] if raised else ""
+        return shown.alarm(self._entry or key)
 
     def _alarm(self) -> bool:
         """Raised, acknowledged where that is required, and returned, in this order."""
         alarm = next(each for each in self.panel.alarms if each.id == self.row.name)
-        shown = self.watch.shown.alarm(self._alarm_key)
+        shown = self._alarm_row()
         state, after_s = str(shown.get("state", "")), time.monotonic() - self.began
         if state == "active":
             self._pass("raised", after_s)

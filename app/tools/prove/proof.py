@@ -15,11 +15,15 @@ from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import quote
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
+from app.cell.alarms.published import entry_name
+from app.cell.recipes.book import FOLDER, RecipeFolder
+from app.cell.recipes.recipe import checked_values, new_recipe
 from app.panel.alarm import Alarm
 from app.panel.condition import Interlock
 from app.panel.model import Panel
@@ -31,6 +35,7 @@ from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.parts import parts_of
 from app.panel.widgets.place import PlaceInput
 from app.panel.widgets.publish import Step
+from app.panel.widgets.recipe_load import RecipeLoad
 from app.panel.widgets.switch import Switch
 from app.panel.widgets.templated import is_stop
 from app.records.entry import GOOD_OUTCOMES
@@ -43,6 +48,7 @@ from app.tools.prove.cases import (
     Plan,
     Situation,
     alarm_key,
+    entry_of,
     names_interlock,
     plan_of,
     situations,
@@ -57,10 +63,13 @@ JOINED_WITHIN_S: Final = 15.0
 QUIET_S: Final = 0.15  # in which what was sent wrongly would arrive
 STOPPED_WITHIN_S: Final = 1.0  # of a hold, from its end
 RAISED_WITHIN_S: Final = 3.0
+LOST_WITHIN_S: Final = 20.0  # also counted from the start of the server
+OVER: Final = frozenset({"", "normal", "returned", "latched"})  # states of an alarm
 BROWSER_WITHIN_S: Final = 5.0  # on a busy machine a page is drawn late
 ENDED_WITHIN_S: Final = 12.0  # a goal of the simulated robot
 BEATS_S: Final = 0.08
 HELD_S: Final = 0.3
+RECIPE: Final = "proof"  # the id of the recipe that is loaded, of each set
 OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
 
 
@@ -138,6 +147,7 @@ class _Round:
             users = (*users, HOLDER)
         self._rig = Rig(panel, self._robots, folder / "data", users=users)
         self._panel = panel = panel_of(panel, robot or None)
+        self._keep_recipes(folder / "data" / FOLDER)
         self._view = PageView(folder / "browser") if looks else None
         self._pages = {
             str(widget.id): str(page.id)
@@ -146,6 +156,15 @@ class _Round:
         }
         self._inputs = {str(w.id): w for w in panel.widgets() if isinstance(w, Input)}
         self._said = self._code = ""  # of the last press
+
+    def _keep_recipes(self, folder: Path) -> None:
+        """A recipe of each set, with examples as its values."""
+        for guarded in self._plan.controls.values():
+            if isinstance(load := guarded.control, RecipeLoad):
+                examples = {field.id: self._value_of_input(field) for field in load.fields}
+                values = checked_values(load.fields, examples)
+                recipe = new_recipe(RECIPE, "created", time.time(), "proof", "Proof", values)
+                RecipeFolder(folder / load.id).write(recipe)
 
     # Rounds.
 
@@ -205,11 +224,13 @@ class _Round:
                         self._hold(guarded, end, None)
             self._robots.permit(())
             for alarm in self._plan.alarms:
-                self._alarm(alarm)
-            self._rig.cut(self._robots.name)
+                if alarm.source != "lost":
+                    self._alarm(alarm)
             began = time.monotonic()
+            self._rig.cut(self._robots.name)
             for guarded in self._plan.controls.values():
                 self._cut_off(guarded, "link_cut", began)
+            self._lost()
 
     def ending(self) -> None:
         """The server begins to end while everything permits."""
@@ -572,39 +593,64 @@ class _Round:
 
     def _alarm(self, alarm: Alarm) -> None:
         """Raised, shown within its time, acknowledged, returned."""
-        name, fault, took_s = str(alarm.id), "", None
-        self._robot.set_alarm(alarm, raised=True)
-        began, within_s = time.monotonic(), RAISED_WITHIN_S + alarm.on_delay_s
-        if not self._within(lambda: self._alarm_state(name) == "active", within_s):
-            fault = f"it is not shown {within_s:g} s after its value: {self._alarm_state(name)}"
+        if alarm.node:
+            self._rig.announce_node(alarm.node, gone=True)
         else:
-            took_s = time.monotonic() - began
-            fault = self._acknowledged(alarm)
-        self._robot.set_alarm(alarm, raised=False)
-        over = ("", "normal", "returned", "latched")
-        if not fault and not self._within(
-            lambda: self._alarm_state(name) in over, RAISED_WITHIN_S + alarm.off_delay_s
-        ):
-            fault = f"it does not return: {self._alarm_state(name)}"
-        self._report(name, "", "raised", fault, took_s, kind="alarm")
+            self._robot.set_alarm(alarm, raised=True)
+        fault, took_s = self._raised(alarm, RAISED_WITHIN_S + (alarm.stale_s or 0.0))
+        if alarm.node:
+            self._rig.announce_node(alarm.node, gone=False)
+        else:
+            self._robot.set_alarm(alarm, raised=False)
+        fault = fault or self._returned(alarm, RAISED_WITHIN_S)
+        self._report(str(alarm.id), "", "raised", fault, took_s, kind="alarm")
+
+    def _lost(self) -> None:
+        """The alarms of a lost link, while it is lost; then the robot is back."""
+        alarms = [alarm for alarm in self._plan.alarms if alarm.source == "lost"]
+        if not alarms:
+            return
+        raised = [(alarm, *self._raised(alarm, LOST_WITHIN_S)) for alarm in alarms]
+        self._rig.join_again()
+        for alarm, fault, took_s in raised:
+            fault = fault or self._returned(alarm, JOINED_WITHIN_S)
+            self._report(str(alarm.id), "", "raised", fault, took_s, kind="alarm")
+
+    def _raised(self, alarm: Alarm, within_s: float) -> tuple[str, float | None]:
+        """That it is shown in time after its on-delay, and can be acknowledged; with the time that it
+        took."""
+        began, within_s = time.monotonic(), within_s + alarm.on_delay_s
+        if self._within(lambda: self._alarm_state(alarm) == "active", within_s):
+            return self._acknowledged(alarm), time.monotonic() - began
+        state = self._alarm_state(alarm)
+        return f"it is not shown {within_s:g} s after it was raised: {state or 'normal'}", None
+
+    def _returned(self, alarm: Alarm, within_s: float) -> str:
+        """That it returns in time after its off-delay; "" if so."""
+        is_over = self._within(lambda: self._alarm_state(alarm) in OVER, within_s + alarm.off_delay_s)
+        return "" if is_over else f"it does not return: {self._alarm_state(alarm)}"
 
     def _acknowledged(self, alarm: Alarm) -> str:
         if alarm.ack == "none" or alarm.confirm_act:
             return ""
-        row = self._alarm_row(str(alarm.id))
+        row = self._alarm_row(alarm)
         body = {"occurrence": row.get("occurrence", 0)}
         status, answer = self._rig.request(
-            "POST", f"/alarms/{alarm_key(str(alarm.id), self._robot_name)}/acknowledge", body
+            "POST", f"/alarms/{quote(self._alarm_key(alarm))}/acknowledge", body
         )
-        done = status == 200 and self._alarm_row(str(alarm.id)).get("acknowledged") is True
+        done = status == 200 and self._alarm_row(alarm).get("acknowledged") is True
         return "" if done else f"it can't be acknowledged: {answer}"
 
-    def _alarm_row(self, name: str) -> dict[str, Any]:
-        rows = self._rig.request("GET", "/alarms")[1].get("alarms", [])
-        return next((row for row in rows if row["id"] == alarm_key(name, self._robot_name)), {})
+    def _alarm_key(self, alarm: Alarm) -> str:
+        key, entry = alarm_key(str(alarm.id), self._robot_name), entry_of(alarm)
+        return f"{key}:{entry_name(entry)}" if entry else key
 
-    def _alarm_state(self, name: str) -> str:
-        return str(self._alarm_row(name).get("state", ""))
+    def _alarm_row(self, alarm: Alarm) -> dict[str, Any]:
+        rows, key = self._rig.request("GET", "/alarms")[1].get("alarms", []), self._alarm_key(alarm)
+        return next((row for row in rows if row["id"] == key), {})
+
+    def _alarm_state(self, alarm: Alarm) -> str:
+        return str(self._alarm_row(alarm).get("state", ""))
 
     # Helpers.
 
@@ -658,6 +704,8 @@ def value_of(control: Command) -> Any:
     """The value that a press of a control has of itself; None where it has none."""
     if isinstance(control, Step):
         return control.min + control.step
+    if isinstance(control, RecipeLoad):
+        return f"{RECIPE}@1"
     return _example_of(control) if isinstance(control, Parameter) else None
 
 

@@ -9,7 +9,7 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AsyncExitStack, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -32,6 +32,7 @@ from app.panel.condition import Interlock
 from app.panel.model import RobotEntry
 from app.panel.roles import ENGINEER
 from app.panel.widgets.key_parts import Confirmation
+from app.panel.widgets.parameter import GET
 from app.ros.messages import load_interfaces
 from app.system.errors import KioskError
 from app.system.settings import Settings, shipped_path
@@ -71,6 +72,7 @@ class Rig:
     shown: Shown = field(default_factory=Shown)
     port: int = 0  # any that is free
     _simulators: dict[str, Simulator] = field(default_factory=dict)
+    _made: dict[str, Callable[[], Simulator]] = field(default_factory=dict)  # at the same endpoint
     _simulating: dict[str, ExitStack] = field(default_factory=dict)
     _state: AppState | None = None
     _loop: asyncio.AbstractEventLoop | None = None
@@ -191,14 +193,27 @@ class Rig:
         interfaces = load_interfaces(panel.distro, panel.interfaces)
         ways = {namespace: way_of(panel, entry or panel)}
         with ExitStack() as stack:
-            simulator = Simulator(ANY_PORT, {namespace: self.robots[name]}, interfaces, ways=ways)
+            robots = {namespace: self.robots[name]}
+            simulator = Simulator(ANY_PORT, robots, interfaces, ways=ways)
             self._simulators[name] = stack.enter_context(simulator)
             self._simulating[name] = stack
-            yield simulator.endpoint
+            endpoint = simulator.endpoint
+            self._made[name] = partial(Simulator, endpoint, robots, interfaces, ways=ways)
+            yield endpoint
 
     def cut(self, robot: str = "") -> None:
         """The link to a robot, by its id, is cut."""
         self._simulating[robot].close()
+
+    def join_again(self) -> None:
+        """The proved robot is back at its endpoint."""
+        name = self.robots.name
+        make = self._made[name]
+        self._simulators[name] = self._simulating[name].enter_context(make())
+
+    def announce_node(self, node: str, *, gone: bool) -> None:
+        """A node of the proved robot is there, or gone."""
+        self._simulators[self.robots.name].announce_service(f"{node}/{GET[0]}", gone=gone)
 
     def announce(self, interlock: Interlock, type_name: str = "", *, gone: bool = False) -> None:
         """See `Simulator.announce`, of the robot that publishes it."""

@@ -12,18 +12,21 @@ from app.panel.alarm import Alarm
 from app.panel.condition import Condition, Interlock
 from app.panel.model import Panel
 from app.panel.robot_panels import panel_of
+from app.panel.widgets.parameter import GET
 from app.panel.widgets.publish import Step
 from app.ros.messages import Interfaces, load_interfaces
 from app.ros.messages.definitions import FLOAT_TYPES
-from app.tools.prove.cases import Field, judged_fields, provable
+from app.tools.prove.cases import ENTRY, Field, entry_of, judged_fields
 from app.tools.simulator.known_types import Moment, plausible
 from app.tools.simulator.machine import candidates, satisfies
 from app.tools.simulator.panel_robot import PanelRobot
 from app.tools.simulator.robot import ActionServer, SimulatedTopic
-from app.tools.simulator.values import put
+from app.tools.simulator.values import Fields, put
 
 REPEAT_S: Final = 0.3  # between two messages of a topic that is judged
 STEP_S: Final = 0.02
+OK, ERROR = 0, 2  # levels of a diagnostic status
+TEXT_TYPES: Final = frozenset({"string", "wstring"})
 BEYOND: Final = 1.5  # of a limit: a value that raises an alarm
 
 
@@ -55,9 +58,12 @@ class ProvingRobot:
         self._judged: dict[Field, Judged] = {}
         for key, conditions in judged_fields(self.panel, self.name).items():
             self._judged[key] = self._judge(key, types[key[0]], conditions)
-        for alarm in self.panel.alarms:
-            if provable(alarm) and alarm.is_for(self.name or None):
-                self._add_alarm(alarm, types)
+        alarms = [alarm for alarm in self.panel.alarms if alarm.is_for(self.name or None)]
+        for alarm in alarms:
+            self._add_alarm(alarm, types)
+        # The services by which the nodes of alarms are known to be there.
+        self._of_nodes = {f"{alarm.node}/{GET[0]}": GET[1] for alarm in alarms if alarm.node}
+        self._said: dict[str, Fields] = {}  # by topic, in place of what the robot publishes there
         for step in self.panel.widgets():
             if isinstance(step, Step):  # it steps from the value that is reported
                 self._judged.setdefault((step.value.topic, step.value.field), Judged((), step.min, ()))
@@ -75,7 +81,11 @@ class ProvingRobot:
         return Judged(conditions, good, choices)
 
     def _add_alarm(self, alarm: Alarm, types: Mapping[str, str]) -> None:
-        """A field by which only alarms are raised: its good value raises none of them."""
+        """The fields by which only alarms are raised or suppressed: their good values do neither."""
+        if (suppressing := alarm.suppressed_while) is not None:
+            key = suppressing.topic, suppressing.field
+            kind = self._interfaces.type_at(types[key[0]], key[1]).name
+            self._judged.setdefault(key, Judged((), unmet_value([suppressing], kind), ()))
         for key in alarm.marked_values:
             if key not in self._judged:
                 kind = self._interfaces.type_at(types[key[0]], key[1]).name
@@ -116,12 +126,36 @@ class ProvingRobot:
             self._sent.pop(interlock.topic, None)
 
     def set_alarm(self, alarm: Alarm, *, raised: bool) -> None:
-        """The field of an alarm gets a value that raises it, or its good one."""
-        key = alarm.marked_values[0]
-        judged = self._judged[key]
+        """What raises an alarm is published, or is not any more."""
         with self.lock:
-            judged.value = raising_value(alarm) if raised else judged.good
-            self._sent.pop(key[0], None)
+            if alarm.topic_name is not None and entry_of(alarm):
+                self._said[alarm.topic_name] = self._message_with(alarm, raised=raised)
+                self._sent.pop(alarm.topic_name, None)
+            elif alarm.source == "stale":
+                self._silent ^= {str(alarm.topic)}
+            elif alarm.marked_values:
+                key = alarm.marked_values[0]
+                judged = self._judged[key]
+                judged.value = raising_value(alarm) if raised else judged.good
+                self._sent.pop(key[0], None)
+
+    def _message_with(self, alarm: Alarm, *, raised: bool) -> Fields:
+        """A message with the entry of an alarm that the robot publishes itself, active or not."""
+        if alarm.listed is None:
+            status = {"name": entry_of(alarm), "level": ERROR if raised else OK, "message": "proof"}
+            return {"status": [{**status, "hardware_id": "", "values": []}]}
+        listed, type_name = alarm.listed, str(alarm.topic_type)
+        kind = self._interfaces.type_at(type_name, listed.field).name
+        structures = self._interfaces.structures
+        entry: Fields = {}
+        code = self._interfaces.type_at(kind, listed.code).name
+        put(entry, kind, listed.code, ENTRY if code in TEXT_TYPES else int(ENTRY), structures)
+        if listed.active is not None:
+            put(entry, kind, listed.active, raised, structures)
+        message: Fields = {}
+        entries = [entry] if raised or listed.active is not None else []
+        put(message, type_name, listed.field, entries, structures)
+        return message
 
     def silence(self, topics: Iterable[str]) -> None:
         """These topics are not published."""
@@ -152,7 +186,7 @@ class ProvingRobot:
 
     @property
     def services(self) -> Mapping[str, str]:
-        return self._robot.services
+        return {**self._of_nodes, **self._robot.services}
 
     @property
     def actions(self) -> Mapping[str, ActionServer]:
@@ -166,11 +200,13 @@ class ProvingRobot:
 
     def serve(self, service: str, payload: bytes) -> bytes | None:
         self.arrived[service] += 1
+        if service in self._of_nodes and service not in self._robot.services:
+            return None
         return self._robot.serve(service, payload)
 
     def step(self, moment: Moment) -> Iterator[tuple[str, bytes]]:
         for topic, payload in self._robot.step(moment):
-            if topic not in self._types:
+            if topic not in self._types and topic not in self._said and topic not in self._silent:
                 yield topic, payload
         with self.lock:
             due = [*self._due(moment)]
@@ -188,6 +224,12 @@ class ProvingRobot:
             payload = self._interfaces.encode(type_name, fields)
             self._sent[topic] = moment.t, payload
             yield topic, payload
+        for topic, fields in self._said.items():
+            sent = self._sent.get(topic)
+            if sent is None or moment.t - sent[0] >= REPEAT_S:
+                payload = self._interfaces.encode(self.publishes[topic].type, fields)
+                self._sent[topic] = moment.t, payload
+                yield topic, payload
 
 
 class ProvingRobots:
@@ -251,12 +293,16 @@ class CountedAction:
         return self._server.result(goal_id)
 
 
+def unmet_value(conditions: Sequence[Condition], kind: str) -> Any:
+    """A value that meets as few of the conditions of a field as can be."""
+    choices = [*candidates(conditions, kind)]
+    return min(choices, key=lambda value: sum(satisfies(each, value) for each in conditions))
+
+
 def calm_value(alarms: Sequence[Alarm], kind: str) -> Any:
     """A value that raises none of the alarms of a field."""
-    conditions = [alarm.when for alarm in alarms if alarm.when is not None]
-    if conditions:
-        choices = [*candidates(conditions, kind)]
-        return min(choices, key=lambda value: sum(satisfies(each, value) for each in conditions))
+    if conditions := [alarm.when for alarm in alarms if alarm.when is not None]:
+        return unmet_value(conditions, kind)
     lows = [limit for alarm in alarms for limit in (alarm.low, alarm.low_low) if limit is not None]
     highs = [limit for alarm in alarms for limit in (alarm.high, alarm.high_high) if limit is not None]
     low = max(lows) if lows else min(highs) - 2 * max(1.0, abs(min(highs)))

@@ -356,7 +356,15 @@ class SimulatedZenohRobot:
             return set()
         own_hash = "" if type_name else published.type_hash
         kind = type_name or published.type
-        endpoint = PanelEndpoint("MP", self._key(topic), kind, published.qos, own_hash)
+        return self._own_tokens(PanelEndpoint("MP", self._key(topic), kind, published.qos, own_hash))
+
+    def service_tokens(self, service: str) -> set[str]:
+        """The liveliness tokens of a service; none for one that it does not serve."""
+        name = self._services.get(service)
+        return self._own_tokens(PanelEndpoint("SS", self._key(service), name)) if name else set()
+
+    def _own_tokens(self, endpoint: PanelEndpoint) -> set[str]:
+        """Those of an endpoint without those of its node."""
         of_node = {*self._wire.tokens(self._namespace, [])}
         return {*self._wire.tokens(self._namespace, [endpoint])} - of_node
 
@@ -481,13 +489,23 @@ class Simulator:
         """The publishers of a topic are announced with another type than their own, or, if `gone`, not
         at all. Without both they are announced as they are."""
         for played in self.robots:
-            shown = self._announced.get((played, topic), played.publisher_tokens(topic))
             wanted = set() if gone else played.publisher_tokens(topic, type_name)
-            self._announced[played, topic] = wanted
-            for token in shown - wanted:
-                self._tokens.pop(token).undeclare()
-            for token in wanted - shown:
-                self._tokens[token] = self._session.liveliness().declare_token(token)
+            self._declare(played, topic, played.publisher_tokens(topic), wanted)
+
+    def announce_service(self, service: str, *, gone: bool = False) -> None:
+        """A service is announced, or, if `gone`, not any more."""
+        for played in self.robots:
+            own = played.service_tokens(service)
+            self._declare(played, service, own, set() if gone else own)
+
+    def _declare(self, played: SimulatedZenohRobot, name: str, own: set[str], wanted: set[str]) -> None:
+        """Declares the wanted tokens of a name in place of those before, at the start its own."""
+        shown = self._announced.get((played, name), own)
+        self._announced[played, name] = wanted
+        for token in shown - wanted:
+            self._tokens.pop(token).undeclare()
+        for token in wanted - shown:
+            self._tokens[token] = self._session.liveliness().declare_token(token)
 
     def _run(self) -> None:
         while not self._ends.wait(self._step_s):

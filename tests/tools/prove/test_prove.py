@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from app.cell.alarms import sources
 from app.cell.commands import holds, presses
 from app.cell.commands.judge import PressJudge
 from app.cell.people import access, confirmer
@@ -223,6 +224,105 @@ def test_who_may_press_does_not_hold_with_wrong_code(
     where, name, instead = OPEN_TO_ALL[mutant]
     monkeypatch.setattr(where, name, instead)
     assert proved(oven).faults
+
+
+ALARMS = """
+title = "Cell"
+language = "en"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "speed"
+kind = "number"
+label = "Speed"
+min = 0
+max = 10
+default = 5
+[[page.widget]]
+id = "height"
+kind = "number"
+label = "Height"
+min = 0
+max = 10
+default = 5
+[[interlock]]
+id = "ready"
+label = "Ready"
+topic = "/ready"
+[[recipe]]
+id = "boxes"
+label = "Boxes"
+fields = ["speed", "height"]
+topic = "/recipe"
+type = "geometry_msgs/msg/Point"
+message = { x = "{speed}", y = "{height}", z = 0 }
+interlock = "ready"
+[recipe.readback]
+topic = "/loaded"
+type = "geometry_msgs/msg/Point"
+fields = { speed = "x", height = "y" }
+[[alarm]]
+id = "silent"
+text = "Silent"
+topic = "/beat"
+type = "std_msgs/msg/Bool"
+stale_s = 1.5
+[[alarm]]
+id = "gone"
+text = "The controller is gone"
+node = "/controller"
+[[alarm]]
+id = "cut"
+text = "No link"
+lost = "robot"
+[[alarm]]
+id = "motors"
+diagnostics = "motor *"
+[[alarm]]
+id = "listed"
+topic = "/faults"
+type = "diagnostic_msgs/msg/DiagnosticArray"
+list = { field = "status", code = "name", text = "message", level = "level" }
+[[alarm]]
+id = "calm"
+text = "Moves in setup"
+when = { topic = "/moves", type = "std_msgs/msg/Bool" }
+while = { topic = "/service", type = "std_msgs/msg/Bool" }
+[[alarm]]
+id = "slow"
+text = "Slow"
+topic = "/slow"
+type = "std_msgs/msg/Float64"
+high = 1.0
+on_delay_s = 600.0
+"""
+
+
+def test_recipes_are_loaded_and_alarms_of_each_source_are_raised(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(ALARMS)
+    proof = proved(load_panel(path))
+    assert [tuple(result) for result in proof.faults] == []
+    assert proof.left_out == {"alarm slow": "it takes 600 s, and the proof waits for 30 s at most"}
+    tried = {(row.name, row.guard, row.situation) for row in proof.results}
+    assert {
+        ("boxes", "ready", situation) for situation in ("permits", "forbids", "never_seen")
+    } <= tried
+    raised = {row.name for row in proof.results if row.kind == "alarm"}
+    assert raised == {"silent", "gone", "cut", "motors", "listed", "calm"}
+
+
+@pytest.mark.long("table")
+@pytest.mark.parametrize("kind", ["stale", "node", "lost"])
+def test_an_alarm_that_is_not_raised_does_not_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(ALARMS)
+    readers: Any = sources.READERS
+    monkeypatch.setitem(readers, kind, always(sources.UNKNOWN))
+    assert [row.kind for row in proved(load_panel(path)).faults] == ["alarm"]
 
 
 def test_the_command_reports_and_signs(
