@@ -24,7 +24,6 @@ from app.cell.people.users_file import UsersFile, users_configured
 from app.cell.session.assembly import check_zenoh, data_folder, mode_of, open_fleet, open_log
 from app.cell.session.doctor_process import DoctorProcess
 from app.panel import Panel, load_panel
-from app.panel.checks.look import page_parts
 from app.panel.widgets.kinds import KINDS
 from app.system import log as ros_logging
 from app.system.concurrency import keep_running, spawn_logged
@@ -36,10 +35,13 @@ from app.system.process.shutdown import Restart, graceful_shutdown
 from app.system.settings import PACKAGE, Settings, shipped_path
 from app.tools.simulator.in_process import in_process
 from app.web.app_state import AppState
-from app.web.application import load_pages, new_application, page_assets, page_revision
-from app.web.metrics import Metrics
-from app.web.pages.compiled_templates import COMPILED
-from app.web.pages.page_templates import PageTemplates
+from app.web.application import (
+    load_pages,
+    new_application,
+    open_state,
+    page_assets,
+    page_revision,
+)
 from app.web.root_path import root_path_of
 from app.web.server import (
     Connection,
@@ -50,7 +52,6 @@ from app.web.server import (
     served_certificate,
     urls,
 )
-from app.web.session_end import follow_users
 
 if TYPE_CHECKING:
     from app.cell.session.fleet import Fleet
@@ -148,7 +149,6 @@ async def _lifespan(
     """From the start of the server to its end."""
     async with _app_state(settings, panel, app.state.server, restart) as state:
         app.state.app_state = state
-        follow_users(state)
         ports: set[int] = set()
         watchdog = _watchdog(state)
         with graceful_shutdown(asyncio.get_running_loop(), partial(_end, state, watchdog, ports)):
@@ -210,18 +210,8 @@ async def _app_state(
             served_certificate(server) as tls,
             _open_robots(settings, panel, revision, oplog, doctor, tls) as (fleet, wall),
         ):
-            metrics = Metrics(
-                fleet if wall is None else None,
-                lambda: oplog.left_out,
-                lambda: limits.refused,
-                lambda: oplog.uncopied,
-                wall,
-            )
-            made = PageTemplates(shipped_path("templates"), page_parts(panel), shipped_path(COMPILED))
             access = Access(UsersFile(data_folder(settings, panel)), panel.access, oplog)
-            await access.reload()
-            fleet.alarms.watch_sign_ins(access)
-            state = AppState(fleet, assets, made, metrics, oplog, limits, doctor, access, wall)
+            state = await open_state(fleet, assets, oplog, limits, doctor, access, wall)
             if settings.take_panel and wall is None:
                 from app.cell.session.sent_panels import PanelReceiver
 

@@ -4,20 +4,29 @@ runs it as a server; the editor previews pages with it."""
 import secrets
 from collections.abc import Callable, Collection
 from contextlib import AbstractAsyncContextManager
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from fastapi import Depends, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
+from app.cell.commands.judge import PressLimits
+from app.cell.people.access import Access
+from app.cell.session.doctor_process import DoctorProcess
+from app.cell.session.fleet import Fleet
 from app.panel import Panel
+from app.panel.checks.look import page_parts
 from app.panel.rules import EmbedRules
 from app.panel.widgets.kinds import KINDS
+from app.records import NullLog, OperatorLog
 from app.system.settings import Settings, shipped_path
 from app.web.app_state import AppState
 from app.web.asgi import Application, ReadableStartupErrors
 from app.web.assets import Assets, load_assets, require_files
 from app.web.caller import LanguageHeaders
 from app.web.error_pages import HANDLERS, on_error_in_development
+from app.web.metrics import Metrics
+from app.web.pages.compiled_templates import COMPILED
+from app.web.pages.page_templates import PageTemplates
 from app.web.path_methods import method_guard
 from app.web.requests import LONGEST
 from app.web.root_path import RootPath
@@ -26,7 +35,11 @@ from app.web.route_tables import LateRoutes, add_routes, load_used
 from app.web.routes import pages
 from app.web.security import BearerGuard, RequestGuard
 from app.web.server import Proxies
+from app.web.session_end import follow_users
 from app.web.turns import Turns
+
+if TYPE_CHECKING:
+    from app.cell.site.wall import Wall
 
 PACKED_FROM: Final = 500  # bytes of a response
 
@@ -92,6 +105,33 @@ def page_revision(panel: Panel, assets: Assets, dev: bool = False) -> str:
     """The revision of all that a page has loaded; in development each start has another one."""
     revision = f"{panel.revision}-{assets.revision}"
     return f"{revision}-{secrets.token_hex(4)}" if dev else revision
+
+
+async def open_state(
+    fleet: Fleet,
+    assets: Assets,
+    oplog: OperatorLog | NullLog,
+    limits: PressLimits,
+    doctor: DoctorProcess,
+    access: Access,
+    wall: "Wall | None" = None,
+) -> AppState:
+    """What requests need of a running fleet, with the users as they are now. Who opened `access` closes
+    it."""
+    panel = fleet.panel
+    metrics = Metrics(
+        fleet if wall is None else None,
+        lambda: oplog.left_out,
+        lambda: limits.refused,
+        lambda: oplog.uncopied,
+        wall,
+    )
+    templates = PageTemplates(shipped_path("templates"), page_parts(panel), shipped_path(COMPILED))
+    await access.reload()
+    fleet.alarms.watch_sign_ins(access)
+    state = AppState(fleet, assets, templates, metrics, oplog, limits, doctor, access, wall)
+    follow_users(state)
+    return state
 
 
 async def load_pages(app: FastAPI, state: AppState, panel: Panel) -> None:

@@ -27,7 +27,6 @@ from app.cell.people.users_file import UsersFile
 from app.cell.session.assembly import open_fleet, open_log
 from app.cell.session.doctor_process import DoctorProcess
 from app.panel import Panel
-from app.panel.checks.look import page_parts
 from app.panel.condition import Interlock
 from app.panel.model import RobotEntry
 from app.panel.roles import ENGINEER
@@ -35,18 +34,20 @@ from app.panel.widgets.key_parts import Confirmation
 from app.panel.widgets.parameter import GET
 from app.ros.messages import load_interfaces
 from app.system.errors import KioskError
-from app.system.settings import Settings, shipped_path
+from app.system.settings import Settings
 from app.tools.prove.cases import Persona
 from app.tools.prove.robot import ProvingRobots
 from app.tools.prove.shown import Shown, read_events
 from app.tools.simulator.zenoh import ANY_PORT, Simulator, way_of
 from app.web.app_state import AppState
-from app.web.application import load_pages, new_application, page_assets, page_revision
-from app.web.metrics import Metrics
-from app.web.pages.compiled_templates import COMPILED
-from app.web.pages.page_templates import PageTemplates
+from app.web.application import (
+    load_pages,
+    new_application,
+    open_state,
+    page_assets,
+    page_revision,
+)
 from app.web.server import OPTIONS
-from app.web.session_end import follow_users
 
 log = logging.getLogger("kiosk.prove")
 
@@ -154,13 +155,8 @@ class Rig:
             fleet = await stack.enter_async_context(opened)
             rules = self.panel.access.model_copy(update={"oidc": None, "idle_s": 0.0})
             access = Access(UsersFile(self.data), rules, oplog)
-            await access.reload()
             stack.callback(access.close)
-            templates = PageTemplates(
-                shipped_path("templates"), page_parts(self.panel), shipped_path(COMPILED)
-            )
-            metrics = Metrics(fleet, lambda: 0, lambda: limits.refused, lambda: {})
-            self._state = AppState(fleet, assets, templates, metrics, oplog, limits, doctor, access)
+            self._state = await open_state(fleet, assets, oplog, limits, doctor, access)
             await asyncio.to_thread(LOADING.acquire)
             try:
                 app = await self._loaded_application(settings, self._state)
@@ -179,7 +175,6 @@ class Rig:
         """The application with all routes that the proof requests."""
         app = new_application(settings, self.panel.embed)
         app.state.app_state = state
-        follow_users(state)
         await load_pages(app, state, self.panel)
         for segment in REQUESTED:
             await app.state.routes.load(segment)

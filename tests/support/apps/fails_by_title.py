@@ -15,9 +15,9 @@ if TITLE == "ends at import":
     os._exit(70)
 if TITLE in ("fails at start", "ends at start"):
 
-    def fails(_: Any) -> None:
+    def fails(*_: Any) -> None:
         if TITLE == "ends at start":
             os._exit(71)
         raise RuntimeError("this panel does not start")
 
-    vars(wired)["follow_users"] = fails
+    vars(wired)["open_state"] = fails
