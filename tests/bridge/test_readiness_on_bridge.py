@@ -102,9 +102,10 @@ def test_a_bridge_whose_main_loop_ended_is_seen_at_the_request(
     assert answer.json()["code"] in ("link_no_bridge", "link_bridge_silent")
 
 
-def test_health_answers_while_every_thread_of_the_executors_is_busy() -> None:
+def test_health_answers_while_every_thread_of_the_executors_is_busy(tmp_path: Path) -> None:
     port = free_port()
-    process = Process([sys.executable, "-c", BUSY, str(port)], {"PYTHONPATH": str(ROOT)}, cwd=ROOT)
+    variables = {"PYTHONPATH": str(ROOT), "KIOSK_DATA": str(tmp_path)}
+    process = Process([sys.executable, "-c", BUSY, str(port)], variables, cwd=ROOT)
     with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=2, trust_env=False) as http:
 
         def says(path: str) -> bool:
