@@ -194,6 +194,8 @@ class Wire:
         self.is_cut = False
         self._target = target
         self._listener = socket.create_server(("127.0.0.1", self.port))
+        self._lock = threading.Lock()
+        self._is_closed = False
         self._sockets: list[socket.socket] = []
         threading.Thread(target=self._accept, daemon=True).start()
 
@@ -201,8 +203,15 @@ class Wire:
         with suppress(OSError):
             while True:
                 near, _ = self._listener.accept()
-                far = socket.create_connection(("127.0.0.1", self._target))
-                self._sockets += [near, far]
+                try:
+                    far = socket.create_connection(("127.0.0.1", self._target))
+                except OSError:
+                    near.close()
+                    continue
+                with self._lock:
+                    self._sockets += [near, far]
+                if self._is_closed:
+                    self.reset()
                 for ends in ((near, far), (far, near)):
                     threading.Thread(target=self._copy, args=ends, daemon=True).start()
 
@@ -215,13 +224,15 @@ class Wire:
 
     def reset(self) -> None:
         """Ends all connections."""
-        for end in self._sockets:
+        with self._lock:
+            ended, self._sockets = self._sockets, []
+        for end in ended:
             with suppress(OSError):
                 end.shutdown(socket.SHUT_RDWR)
             end.close()
-        self._sockets.clear()
 
     def close(self) -> None:
+        self._is_closed = True
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
