@@ -240,7 +240,7 @@ def _write(out: IO[bytes], is_result: bool, value: Any) -> None:
 
 
 def _limit(limits: Limits) -> None:
-    with suppress(OSError):  # the unit's filter of system calls may forbid it
+    with suppress(OSError):  # a unit of before forbids it
         os.nice(limits.nice)
     if limits.within_s is not None:
         signal.setitimer(signal.ITIMER_REAL, limits.within_s)  # SIGALRM ends a process

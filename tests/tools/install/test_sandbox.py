@@ -1,13 +1,16 @@
 """The server under the restrictions of its unit, as far as they need no systemd: every feature works,
 and nothing else does."""
 
+import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from app.records.verify import verify
+from app.system.worker import BACKGROUND
 from tests.support.parts import ROOT, Server, until
 from tests.support.sandbox import allowed_calls, mount_commands, setting
 from tests.support.servers import ready
@@ -65,7 +68,7 @@ def data(tmp_path: Path) -> Path:
     ("attempt", "refused"),
     [
         (f"open({str(ROOT / 'x')!r}, 'w')", "Read-only file system"),
-        ("__import__('os').nice(1)", "Operation not permitted"),
+        ("__import__('os').nice(-1)", "Operation not permitted"),
         ("__import__('os').chown('/tmp', 1, 1)", "Operation not permitted"),
         ("__import__('mmap').mmap(-1, 4096, prot=7)", "Permission denied"),
         ("__import__('socket').socket(17, 3)", "Operation not permitted"),
@@ -83,8 +86,22 @@ def test_what_the_server_does_not_need_is_refused(data: Path, attempt: str, refu
 
 def test_the_units_calls_are_those_of_a_service_without_privileges() -> None:
     calls = allowed_calls(UNIT.read_text())
-    assert {"read", "socket", "fdatasync", "clone", "execve"} <= calls
-    assert not {"mount", "reboot", "setuid", "setpriority", "ptrace", "bpf", "init_module"} & calls
+    assert {"read", "socket", "fdatasync", "clone", "execve", "setpriority"} <= calls
+    refused = {"mount", "reboot", "setuid", "sched_setscheduler", "ptrace", "bpf", "init_module"}
+    assert not refused & calls
+
+
+def niceness() -> Iterator[int]:
+    yield os.nice(0)
+
+
+def test_a_worker_has_a_lower_priority_than_the_server(data: Path) -> None:
+    worker = f"Worker('{__name__}:{niceness.__name__}')"
+    script = f"from app.system.worker import Worker; print(*{worker}.results())"
+    variables = {**os.environ, "TMPDIR": str(data.parent / TEMPORARY)}
+    words = [*sandboxed(data), sys.executable, "-c", script]
+    done = subprocess.run(words, cwd=ROOT, env=variables, capture_output=True, text=True)
+    assert done.stdout.strip() == str(os.nice(0) + BACKGROUND), done.stderr
 
 
 def findings(server: Server) -> list[dict[str, str]]:
