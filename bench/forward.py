@@ -60,7 +60,10 @@ def main() -> None:
 def measured() -> Iterator[tuple[Any, ...]]:
     """A row for each round with and without, then both together."""
     every: dict[bool, list[float]] = {False: [], True: []}
-    with tempfile.TemporaryDirectory(prefix="bench-forward-") as name, cluster(is_elsewhere=True) as postgres:
+    with (
+        tempfile.TemporaryDirectory(prefix="bench-forward-") as name,
+        cluster(is_elsewhere=True) as postgres,
+    ):
         folder = Path(name)
         filled = CellData(folder / "filled")
         for _ in range(ENTRIES // 1000):
