@@ -11,7 +11,7 @@ from typing import Final
 GROWTH: Final = 1.05
 
 FIGURES: Final[Mapping[str, int]] = {
-    # 2026-11-29
+    # 2026-11-30
     "modules of the server, shipped panel": 322,
     "modules of the server, three widgets": 307,
     "all modules, shipped panel": 926,
@@ -23,9 +23,9 @@ FIGURES: Final[Mapping[str, int]] = {
     "wake-ups for 1,000 messages that no one looks at": 0,
     "wake-ups for 1,000 messages in 20 frames": 20,
     "wake-ups for 1,000 permissions, a turn after each": 1000,
-    "calls of a published press": 685,
-    "calls of a service's press, drawn": 1260,
-    "calls of a sign-in": 370,
+    "calls of a published press": 705,
+    "calls of a service's press, drawn": 1324,
+    "calls of a sign-in": 393,
 }
 # What a figure must not exceed, however it has grown.
 MOST: Final[Mapping[str, int]] = {

@@ -308,6 +308,8 @@ class Socket(WebSocketsSansIOProtocol):
     async def send(self, message: ASGISendEvent) -> None:
         if self.close_sent and message["type"] == "websocket.send":
             raise ClientDisconnected  # uvicorn takes it for a fault of the application
+        if message["type"] == "websocket.accept" and self.transport.is_closing():
+            raise ClientDisconnected  # uvicorn would accept nothing, and refuse the first message
         await super().send(message)
         if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
             self.handshake_complete = True  # uvicorn would take the answer for none

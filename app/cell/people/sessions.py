@@ -116,7 +116,8 @@ class Sessions:
 
     def ends_by(self, session: Session) -> EndsBy:
         """What ends it first: a touch puts off the one, and not the other."""
-        return "longest" if self._longest_left(session) <= self._idle_left(session) else "idle"
+        idle, longest = self._ends(session)
+        return "longest" if longest <= idle else "idle"
 
     def seen_s(self, session: Session) -> tuple[float, float]:
         """How many seconds ago it began, and its page was touched."""
@@ -164,12 +165,11 @@ class Sessions:
         return iter([*self._sessions.values()])
 
     def _left(self, session: Session) -> float:
-        if session.holds:
-            return math.inf
-        return min(self._idle_left(session), self._longest_left(session))
+        return math.inf if session.holds else min(self._ends(session)) - self._monotonic()
 
-    def _idle_left(self, session: Session) -> float:
-        return session.touched_at + self.idle_s - self._monotonic() if self.idle_s else math.inf
-
-    def _longest_left(self, session: Session) -> float:
-        return session.begun_at + self.longest_s - self._monotonic() if self.longest_s else math.inf
+    def _ends(self, session: Session) -> tuple[float, float]:
+        """When it is idle for too long, and when its longest time is over, in monotonic seconds."""
+        return (
+            session.touched_at + self.idle_s if self.idle_s else math.inf,
+            session.begun_at + self.longest_s if self.longest_s else math.inf,
+        )
