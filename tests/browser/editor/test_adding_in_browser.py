@@ -7,6 +7,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
+from tests.browser.editor.test_editor_in_browser import opened
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
 from tests.support.editor import PANEL, EditorServer, box_of, drag_line, editing, middle, preview
@@ -47,9 +48,7 @@ def reused_page(chromium: Browser) -> Iterator[ReusedPage]:
 def desk(page: Page, running: EditorServer) -> Page:
     running.edit({"op": "text", "path": [], "text": GUARDED}).raise_for_status()
     page.set_viewport_size({"width": 1440, "height": 900})
-    page.goto(running.address)
-    expect(preview(page).locator("#at-speed")).to_be_visible()
-    return page
+    return opened(page, running)
 
 
 def written(editor: EditorServer) -> dict[str, Any]:

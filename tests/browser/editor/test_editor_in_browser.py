@@ -43,8 +43,13 @@ def editor(running: EditorServer) -> EditorServer:
 
 @pytest.fixture
 def desk(page: Page, editor: EditorServer) -> Page:
-    """The editor's page on a desk screen, with the preview there."""
+    """The editor's page on a desk screen."""
     page.set_viewport_size({"width": 1440, "height": 900})
+    return opened(page, editor)
+
+
+def opened(page: Page, editor: EditorServer) -> Page:
+    """The editor's page, with the preview there: nothing moves under a click any more."""
     page.goto(editor.address)
     expect(preview(page).locator("#at-speed")).to_be_visible()
     expect(page.locator(".tr").first).to_be_visible()
@@ -314,9 +319,7 @@ def test_a_conflict_with_the_disk_is_chosen_and_saved(desk: Page, editor: Editor
 
 def test_two_browsers_see_one_document(desk: Page, editor: EditorServer, chromium: Browser) -> None:
     with chromium.new_context(viewport={"width": 1280, "height": 800}, locale="ja") as context:
-        other = context.new_page()
-        other.goto(editor.address)
-        expect(preview(other).locator("#at-speed")).to_be_visible()
+        other = opened(context.new_page(), editor)
         expect(other.locator("#status")).to_have_text("保存済み")
         select(other, "#at-open", OPEN)
         expect(desk.locator(".ring.other .tag")).to_have_text("call: open")
@@ -332,7 +335,7 @@ def test_axe_finds_nothing(chromium: Browser, editor: EditorServer, language: st
     with chromium.new_context(viewport=viewport, locale=language, bypass_csp=True) as context:
         page = context.new_page()
         editor.edit({"op": "insert", "path": ["alarm", 0], "value": LOAD_LOW}).raise_for_status()
-        page.goto(editor.address)
+        opened(page, editor)
         page.evaluate(AXE)
 
         def violations() -> Any:

@@ -34,13 +34,13 @@ def test_attached_thread_keeps_its_state(peer: tuple[str, zenoh.Session]) -> Non
 
     def hear(_: zenoh.Sample) -> None:
         attach()
-        kept.setdefault(threading.get_ident(), []).append(hasattr(own, "mark"))
+        kept.setdefault(threading.get_native_id(), []).append(hasattr(own, "mark"))
         own.mark = True
 
     with zenoh.open(config_to(endpoint)) as here:
         here.declare_subscriber("a", Callback(hear, indirect=False))
         until(lambda: (there.put("a", b""), sum(map(len, kept.values())) > 20)[1], "it is heard")
-    assert threading.get_ident() not in kept
+    assert threading.get_native_id() not in kept
     for marks in kept.values():
         assert marks == [False, *[True] * (len(marks) - 1)]
 
@@ -48,7 +48,7 @@ def test_attached_thread_keeps_its_state(peer: tuple[str, zenoh.Session]) -> Non
 def test_a_thread_of_pythons_own_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """It ends with its state, and would leave it behind."""
     calls: list[int] = []
-    api = SimpleNamespace(PyGILState_Ensure=lambda: calls.append(threading.get_ident()))
+    api = SimpleNamespace(PyGILState_Ensure=lambda: calls.append(threading.get_native_id()))
     monkeypatch.setattr(session, "ctypes", SimpleNamespace(pythonapi=api))
     monkeypatch.setattr(session, "_attached_threads", set())
     thread = threading.Thread(target=attach)
