@@ -4,6 +4,7 @@ robots of one panel at several routers, and namespaces behind a router that is n
 import itertools
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -122,6 +123,10 @@ def shows(server: Server, text: str) -> bool:
     return bool(server.widget("heard")["text"] == text)
 
 
+def is_locked(server: Server) -> bool:
+    return not server.widget("say")["enabled"]
+
+
 def is_permitted(server: Server) -> bool:
     """Whether nothing but control is missing."""
     return str(press(server, "early")["code"]) == "control_free"
@@ -136,10 +141,10 @@ def test_one_robot_on_two_panels_at_two_routers(
         for number, endpoint in enumerate(routers.endpoints)
     )
     for server in (first, second):
-        until(lambda each=server: is_permitted(each), "control alone is missing")  # type: ignore[misc]
+        until(partial(is_permitted, server), "control alone is missing")
     robot.tell("both")
     for server in (first, second):
-        until(lambda each=server: shows(each, "both"), "both see it")  # type: ignore[misc]
+        until(partial(shows, server, "both"), "both see it")
     # Control is of a panel: who has it at one has it at no other, and takes it from no one there.
     take_control(first)
     assert press(first, "of the first")["outcome"] == "published"
@@ -153,7 +158,7 @@ def test_one_robot_on_two_panels_at_two_routers(
     # What the robot forbids is locked at both.
     robot.permit(False)
     for server in (first, second):
-        until(lambda each=server: not each.widget("say")["enabled"], "both are locked")  # type: ignore[misc]
+        until(partial(is_locked, server), "both are locked")
         assert press(server, "locked")["code"] == "interlock_not_permitted"
     robot.permit(True)
     # A router ends with one of the panels at it: the other goes on.
@@ -210,16 +215,16 @@ def _each_robot_is_its_own(server: Server, robots: list[Robot]) -> None:
     """Each gets its own presses and is shown with its own values; its permission is its own."""
     pages = [server.robot(f"r{number}") for number, _ in enumerate(robots, 1)]
     for number, (page, robot) in enumerate(zip(pages, robots, strict=True), 1):
-        until(lambda each=page: is_permitted(each), "control alone is missing")  # type: ignore[misc]
+        until(partial(is_permitted, page), "control alone is missing")
         robot.tell(f"robot {number}")
         take_control(page)
         assert press(page, f"for {number}")["outcome"] == "published"
     for number, (page, robot) in enumerate(zip(pages, robots, strict=True), 1):
-        until(lambda p=page, n=number: shows(p, f"robot {n}"), "its own value")  # type: ignore[misc]
-        until(lambda r=robot: r.heard(), "the press has arrived")  # type: ignore[misc]
+        until(partial(shows, page, f"robot {number}"), "its own value")
+        until(robot.heard, "the press has arrived")
         assert robot.heard() == [f"for {number}"]
     robots[0].permit(False)
-    until(lambda: not pages[0].widget("say")["enabled"], "the first robot forbids it")
+    until(partial(is_locked, pages[0]), "the first robot forbids it")
     assert pages[1].widget("say")["enabled"]
     robots[0].permit(True)
     until(lambda: pages[0].widget("say")["enabled"], "it permits it again")

@@ -62,7 +62,7 @@ VEX: Final = "vex.json"  # beside the panel file, or in the data folder
 UPDATES: Final = "updates"  # the folder of newer releases, beside the panel file
 POSTPONED: Final = "update-notice.json"  # in the data folder
 MOST_FILES: Final = 200
-RELOAD_S: Final = 3600.0  # packages may have been installed meanwhile
+RELOAD_S: Final = 3600.0  # packages may have been installed since
 
 Stamp = tuple[object, ...]
 

@@ -66,8 +66,7 @@ def _simulated(options: Namespace, subject: "Subject") -> "Proof":
 def _watched(options: Namespace, subject: "Subject") -> "Proof":
     """The live proof, as far as it goes: Ctrl-C, the end of the input and the key q stop it."""
     from app.tools.prove.answers import AnswersFile
-    from app.tools.prove.live import LiveProof, watcher_name
-    from app.tools.prove.live_robots import watched_robots
+    from app.tools.prove.live import LiveProof, watched_robots, watcher_name
     from app.tools.prove.terminal import Terminal
 
     token = kiosk_token(options)

@@ -1,17 +1,23 @@
 """The live proof: guided steps at a real robot, each with what the panel measured and the word of the
 person who watches. It presses nothing by itself."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Final
 
 from app.panel.model import Panel
+from app.panel.robot_panels import panel_of
+from app.panel.roles import ENGINEER
 from app.system.errors import KioskError
 from app.system.printable import readable
+from app.system.texts import render
+from app.tools.editor.kiosk_client import KioskClient
 from app.tools.prove.answers import Answer, AnswersFile, Word, now_text
+from app.tools.prove.cases import plan_of
 from app.tools.prove.measures import Measure
 from app.tools.prove.result import NOT_REACHED, Proof, Result
-from app.tools.prove.steps import AT_THE_END, Row, Step
+from app.tools.prove.steps import AT_THE_END, Row, Step, steps_of
 from app.tools.prove.terminal import Terminal
 from app.tools.prove.watch import PanelWatch
 
@@ -32,6 +38,45 @@ class Watched:
     stranger: PanelWatch | None
     steps: Sequence[Step]
     robot: str = ""
+
+
+@contextmanager
+def watched_robots(
+    address: str, token: str | None, trust: str, panel: Panel
+) -> Iterator[Sequence[Watched]]:
+    """The robots of the panel at an address, watched until the end of the block. KioskError if it can't
+    be reached, shows another panel file, or the token is not an engineer's."""
+    client = KioskClient(address, token, trust)
+    session = client.session()
+    if session.get("role") != ENGINEER:
+        raise KioskError(
+            "an engineer's token is needed: to all others the panel shows some controls as locked"
+            " (--token-file)"
+        )
+    has_users = bool(session.get("users"))
+    with ExitStack() as stack:
+
+        def watch(own: KioskClient, robot: str, name: str, *, reads_log: bool) -> PanelWatch:
+            made = PanelWatch(own, robot, name, reads_log=reads_log)
+            stack.callback(made.close)
+            made.start()
+            return made
+
+        robots = []
+        for entry in panel.robots or (None,):
+            robot, name = (str(entry.id), render(entry.name)) if entry else ("", "")
+            own = panel_of(panel, robot or None)
+            watching = watch(client, robot, name, reads_log=True)
+            served = watching.shown.revision.partition("-")[0]
+            if served != panel.revision:
+                raise KioskError(
+                    f"the server shows another panel file: {served}…, and this is {panel.revision}…"
+                )
+            outside = KioskClient(address, None, trust)
+            stranger = watch(outside, robot, name, reads_log=False) if has_users else None
+            steps = [*steps_of(own, plan_of(own, robot), has_users=has_users)]
+            robots.append(Watched(own, watching, stranger, steps, robot))
+        yield robots
 
 
 class LiveProof:

@@ -33,7 +33,7 @@ SITUATIONS: Final[Mapping[str, str]] = {
     "no_role": "without a role",
     "role_less": "a user without the role or group: refused",
     "role_enough": "a user with just the role and groups: it works",
-    "unconfirmed": "a press that nobody has confirmed",
+    "unconfirmed": "a press that no one has confirmed",
     "wrong_pin": "confirmed with a wrong PIN",
     "same_person": "both persons are the same",
     "shutdown": "the server is ending",

@@ -107,7 +107,7 @@ def _of_press(guarded: Guarded) -> Step:
     return Step(
         f"press/{control.id}",
         f'control {control.id} ("{render(control.label)}"), press',
-        "Bring about that it is free, make sure that nobody is in danger, and press it at the panel.",
+        "Bring about that it is free, make sure that no one is in danger, and press it at the panel.",
         "The machine does it, and the panel says so.",
         [Row("control", str(control.id), "", "permits")],
     )
@@ -123,7 +123,7 @@ def _of_hold(guarded: Guarded, plan: Plan) -> Iterator[Step]:
                 f"hold/{control.id}/{end}/{guard}",
                 f'hold {control.id} ("{render(control.label)}"), {end}'
                 + (f" by {guard}" if guard else ""),
-                "Bring about that it is free, make sure that nobody is in danger, and hold it at the"
+                "Bring about that it is free, make sure that no one is in danger, and hold it at the"
                 f" panel. Then {how}.",
                 "The machine stops at once.",
                 [Row("hold", str(control.id), guard, end)],

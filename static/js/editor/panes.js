@@ -80,7 +80,7 @@ function focusNamed(pane, named) {
   if (same instanceof HTMLElement) same.focus({ preventScroll: true });
 }
 
-// The focus goes back to what opened a question, or to what took its place when the pane was filled meanwhile.
+// The focus goes back to what opened a question, or to what took its place when the pane was filled again.
 /** @param {HTMLElement} pane @param {HTMLElement} opener */
 export function focusAgain(pane, opener) {
   if (opener.isConnected) opener.focus();
