@@ -69,8 +69,14 @@ BROWSER_WITHIN_S: Final = 5.0  # on a busy machine a page is drawn late
 ENDED_WITHIN_S: Final = 12.0  # a goal of the simulated robot
 BEATS_S: Final = 0.08
 HELD_S: Final = 0.3
+TRIES: Final = 3  # to begin a hold that must begin
+REFUSED: Final = "the server refuses the hold"
 RECIPE: Final = "proof"  # the id of the recipe that is loaded, of each set
 OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
+
+
+def is_held(answer: Mapping[str, Any]) -> bool:
+    return answer.get("state") == "held"
 
 
 def prove(
@@ -506,15 +512,14 @@ class _Round:
         with self._socket(guarded) as socket:
             try:
                 begun = self._begin(socket, guarded, confirmation)
-                return "published" if begun else "refused"
+                return "published" if is_held(begun) else "refused"
             except ConnectionClosed:
                 return "refused"
 
     def _begin(
         self, socket: ClientConnection, guarded: Guarded, confirmation: str | None = None
-    ) -> dict[str, Any] | None:
-        """The answer to the begin of a hold: None if it is refused. `confirmation` as in
-        `_refuses`."""
+    ) -> dict[str, Any]:
+        """The answer to the begin of a hold. `confirmation` as in `_refuses`."""
         stamp, values = json.loads(socket.recv(5))["stamp"], self._values(guarded)
         if confirmation is None:
             confirmation = self._confirmed(guarded, values)
@@ -524,16 +529,30 @@ class _Round:
         }  # fmt: skip
         socket.send(json.dumps(begin))
         answer: dict[str, Any] = json.loads(socket.recv(5))
-        return answer if answer.get("state") == "held" else None
+        return answer
+
+    def _tried(
+        self, guarded: Guarded, attempt: Callable[[], tuple[str, float | None]]
+    ) -> tuple[str, float | None]:
+        """What is refused because the state has just changed is begun again, as by an operator."""
+        for _ in range(TRIES - 1):
+            fault, took_s = attempt()
+            if not fault.startswith(REFUSED):
+                return fault, took_s
+            self._await_free(str(guarded.control.id))
+        return attempt()
 
     def _holds(self, guarded: Guarded) -> str:
         """That a hold is sent while it is held; "" if so."""
+        return self._tried(guarded, lambda: (self._held_for_a_moment(guarded), None))[0]
+
+    def _held_for_a_moment(self, guarded: Guarded) -> str:
         topic = str(getattr(guarded.control, "topic", ""))
         before = self._robot.arrived[topic]
         with self._socket(guarded) as socket:
             try:
-                if (held := self._begin(socket, guarded)) is None:
-                    return "the server refuses the hold"
+                if not is_held(held := self._begin(socket, guarded)):
+                    return f"{REFUSED}: {held.get('reason')}"
                 self._beat(socket, held, HELD_S)
             except ConnectionClosed as closed:
                 return f"the server ended the hold: {closed}"
@@ -553,19 +572,23 @@ class _Round:
     def _hold(self, guarded: Guarded, end: HoldEnd, interlock: Interlock | None) -> None:
         """A hold that ends in a way: how long until the last message has left."""
         name, guard = str(guarded.control.id), interlock.id if interlock else ""
-        try:
-            with self._socket(guarded) as socket:
-                fault, took_s = self._held_until(socket, guarded, end, interlock)
-        except (ConnectionClosed, TimeoutError) as closed:
-            fault, took_s = f"the hold ended by itself: {closed}", None
+
+        def attempt() -> tuple[str, float | None]:
+            try:
+                with self._socket(guarded) as socket:
+                    return self._held_until(socket, guarded, end, interlock)
+            except (ConnectionClosed, TimeoutError) as closed:
+                return f"the hold ended by itself: {closed}", None
+
+        fault, took_s = self._tried(guarded, attempt)
         self._report(name, guard, end, fault, took_s, kind="hold")
 
     def _held_until(
         self, socket: ClientConnection, guarded: Guarded, end: HoldEnd, interlock: Interlock | None
     ) -> tuple[str, float | None]:
         """Holds for a moment, brings about the end, and looks whether it stops."""
-        if (held := self._begin(socket, guarded)) is None:
-            return "the server refuses the hold", None
+        if not is_held(held := self._begin(socket, guarded)):
+            return f"{REFUSED}: {held.get('reason')}", None
         self._beat(socket, held, HELD_S)
         began = time.monotonic()
         if end == "released":

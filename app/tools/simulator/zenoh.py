@@ -94,7 +94,7 @@ class Wire:
 
     def publisher(self, key: str, type_name: str, *, latched: bool = False) -> Callable[[bytes], None]:
         """A function that publishes. A latched publisher keeps its last message for subscribers that
-        come late."""
+        come late, and does not repeat it: Zenoh must not drop it where a connection is slow."""
         expression = self._dialect.topic(key, type_name)
         declared: Any = (
             declare_advanced_publisher(
@@ -102,6 +102,7 @@ class Wire:
                 expression,
                 cache=CacheConfig(max_samples=1),
                 publisher_detection=True,
+                congestion_control=zenoh.CongestionControl.BLOCK,
             )
             if latched
             else self._session.declare_publisher(expression)
