@@ -155,6 +155,14 @@ def is_cache_of(token: str, zid: str) -> bool:
     return f"{_CACHES}{zid}/" in token
 
 
+def numbered_publisher(token: str) -> str:
+    """The publisher (zid/entity id) of a cache whose messages are numbered; "" where they are not. One
+    that numbers them says on the key of its token which was the last: what was lost is noticed."""
+    zid, _, rest = token.partition(_CACHES)[2].partition("/")
+    entity = rest.partition("/")[0]
+    return f"{zid}/{entity}" if entity.isdecimal() else ""
+
+
 def newest(token: str) -> str:
     """The query for the last message of a cache."""
     return f"{token}?_max=1"

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from app.ros.zenoh.sample import Buffer, Sample, SkippedPayload
 from app.system.limits import BoundedQueue
@@ -22,6 +22,19 @@ KEPT_MOST: Final = 4_000  # samples of all recorded topics that are kept from on
 KEPT_BYTES: Final = 32_000_000  # and their bytes
 
 NO_KEYS: Final[frozenset[str]] = frozenset()
+
+
+NUMBERS: Final = 2**32  # a publisher's numbers begin again after as many messages
+
+
+class Number(NamedTuple):
+    """The number of a message among those of its publisher (zid/entity id)."""
+
+    publisher: str
+    value: int
+
+    def is_after(self, earlier: int) -> bool:
+        return 0 < (self.value - earlier) % NUMBERS < NUMBERS // 2
 
 
 class Stamp(Protocol):
@@ -50,7 +63,8 @@ class Token:
 class Changes:
     """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
     `recorded_samples` has every sample of the recorded topics, and the changes of the changing ones.
-    `caches` are (key, token) of the publishers that keep their last message for late subscribers.
+    `caches` are (key, token) of the publishers that keep their last message for late subscribers,
+    `behind` those of which the last message was lost on its way.
     `reopen`: the session has to be opened again."""
 
     samples: dict[str, Sample]
@@ -58,6 +72,7 @@ class Changes:
     link_up: bool
     recorded_samples: Collection[tuple[str, Sample]] = ()
     caches: Collection[tuple[str, str]] = ()
+    behind: Collection[tuple[str, str]] = ()
     reopen: bool = False
 
 
@@ -130,7 +145,9 @@ class Inbox:
         self._last_payloads: dict[str, bytes] = {}  # of the topics of which changes are kept
         self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
+        self._numbers: dict[tuple[str, str], int] = {}  # (key, publisher) → of its last message
         self._caches: list[tuple[str, str]] = []
+        self._behind: list[tuple[str, str]] = []
         self._transports: set[str] = set()
         self._kept = _kept_samples()
 
@@ -193,13 +210,14 @@ class Inbox:
             self._woken = self._has_immediate = False
             samples, self._samples = self._samples, {}
             if self._idle_samples and (
-                whole or self._tokens or self._caches or self._connections_changed
+                whole or self._tokens or self._caches or self._behind or self._connections_changed
             ):
                 samples |= self._idle_samples
                 self._idle_samples = {}
             self._connections_changed = False
             tokens, self._tokens = self._tokens, {}
             caches, self._caches = self._caches, []
+            behind, self._behind = self._behind, []
             kept, self._kept = self._kept, _kept_samples()
             link_up = bool(self._transports)
         is_due = bool(samples) and time.monotonic() >= self._timed_until
@@ -211,6 +229,7 @@ class Inbox:
             link_up,
             [(key, arrived.sample(timed=True)) for key, arrived in kept] if kept else (),
             caches,
+            behind,
         )
 
     @property
@@ -220,18 +239,28 @@ class Inbox:
 
     # Below: on the link's threads, under the lock. No work here, and nothing may raise.
 
-    def put(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
+    def put(self, key: str, payload: Buffer, stamp: Stamp | None, number: Number | None = None) -> None:
         """A sample of a topic. Samples are in the order of reception, not of stamps: clocks may be
         wrong."""
         self._live[key] = stamp
+        if number is not None:
+            self._numbers[key, number.publisher] = number.value
         self._add(key, payload, stamp)
 
-    def put_cached(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
+    def put_cached(
+        self, key: str, payload: Buffer, stamp: Stamp | None, number: Number | None = None
+    ) -> None:
         """A sample from a publisher's cache; ignored if the publisher has published since."""
-        if key in self._live:
+        known = None if number is None else self._numbers.get((key, number.publisher))
+        if number is not None and known is not None:
+            if not number.is_after(known):
+                return
+        elif key in self._live:
             last = self._live[key]
             if last is None or stamp is None or last.get_id() == stamp.get_id():
                 return
+        if number is not None:
+            self._numbers[key, number.publisher] = number.value
         self._add(key, payload, stamp, cached=True)
 
     def _add(self, key: str, payload: Buffer, stamp: Stamp | None, cached: bool = False) -> None:
@@ -270,6 +299,19 @@ class Inbox:
         """The token of a cache of a topic's publisher appeared."""
         self._caches.append((key, token))
         self._wake(True)
+
+    def last_number(self, key: str, token: str, last: Number) -> None:
+        """The publisher with this cache says which message was its last."""
+        known = self._numbers.get((key, last.publisher))
+        if known is None:
+            self.cache(key, token)
+        elif last.is_after(known):
+            self._behind.append((key, token))
+            self._wake(True)
+
+    def publisher_lost(self, key: str, publisher: str) -> None:
+        """A publisher with numbers is gone."""
+        self._numbers.pop((key, publisher), None)
 
     def transport(self, zid: str, up: bool) -> None:
         """A connection was opened or closed."""

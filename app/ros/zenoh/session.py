@@ -3,6 +3,7 @@
 import asyncio
 import atexit
 import ctypes
+import logging
 import os
 import threading
 import time
@@ -15,7 +16,7 @@ import zenoh
 from zenoh.ext import CacheConfig, MissDetectionConfig, declare_advanced_publisher
 from zenoh.handlers import Callback
 
-from app.ros.dialects.dialect import Dialect, caches, is_cache_of
+from app.ros.dialects.dialect import Dialect, caches, is_cache_of, numbered_publisher
 from app.ros.zenoh.answers import ask_newest, collected, first_answer, own_payload
 from app.ros.zenoh.config import (
     endpoints_of,
@@ -25,7 +26,7 @@ from app.ros.zenoh.config import (
     translated,
 )
 from app.ros.zenoh.declarations import NOTHING, Declarations
-from app.ros.zenoh.inbox import Changes, Inbox
+from app.ros.zenoh.inbox import Changes, Inbox, Number
 from app.system.errors import LinkError
 
 # Publishers of the Zenoh session: plain ones, and latched ones, which keep their last message.
@@ -142,14 +143,13 @@ def _ignore(_: zenoh.Sample) -> None:
 # waits for the network wakes another one for each message; one thread for both costs half.
 RUNTIME: Final = "(rx: (handover: net))"
 os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
-_attached_threads: Final[set[int]] = set()
+_attached: Final = threading.local()  # not their ids: one that has ended leaves its id to another
 
 
 def attach() -> None:
     """Call it in every callback on such a thread. Only the first call in a thread has an effect."""
-    me = threading.get_ident()
-    if me not in _attached_threads:
-        _attached_threads.add(me)
+    if not hasattr(_attached, "is_done"):
+        _attached.is_done, me = True, threading.get_ident()
         if all(thread.ident != me for thread in threading.enumerate()):  # those have theirs
             ctypes.pythonapi.PyGILState_Ensure()
 
@@ -157,10 +157,21 @@ def attach() -> None:
 # Owns the Zenoh session. Zenoh's threads put what they receive into the inbox. Errors of Zenoh are
 # raised as LinkError.
 
+log = logging.getLogger("kiosk.link")
+
 ASK_TIMEOUT_S = 2.0
 POLL_S = 0.02
+NUMBER_BYTES: Final = 4  # of the number of a publisher's last message
 NOT_READ = b""  # in place of a payload: it is of no type, so what needs it locks
 OnPayload = Callable[[Any], None]
+
+
+def number_of(sample: zenoh.Sample) -> Number | None:
+    """The number of a message, if its publisher numbers them."""
+    if (info := sample.source_info) is None:
+        return None
+    source = info.source_id
+    return Number(f"{source.zid}/{source.eid}", info.source_sn)
 
 
 class ZenohSession:
@@ -175,6 +186,7 @@ class ZenohSession:
         self._sent: Counter[str] = Counter()  # messages and queries, by key expression
         self._on_demand: dict[str, tuple[str, OnPayload]] = {}  # key → key expression, callback
         self._demanded: dict[str, zenoh.Subscriber[None]] = {}
+        self._numbered: dict[str, zenoh.Subscriber[None]] = {}  # by key: to the numbers of its messages
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._open()
 
@@ -250,6 +262,7 @@ class ZenohSession:
                 key: self._subscriber(*subscription)
                 for key, subscription in dict(self._on_demand).items()
             }
+            self._numbered = {}
 
     def _subscriptions(self, key: str, expression: str) -> Iterator[zenoh.Subscriber[None]]:
         """A subscriber to the topic, and one to the tokens of its publishers' caches. Zenoh's own
@@ -258,7 +271,9 @@ class ZenohSession:
         put = self._inbox.put
         yield self._session.declare_subscriber(
             expression,
-            self._direct(lambda sample: put(key, self._read(sample), sample.timestamp)),
+            self._direct(
+                lambda sample: put(key, self._read(sample), sample.timestamp, number_of(sample))
+            ),
         )
         yield self._session.liveliness().declare_subscriber(
             caches(expression), self._direct(lambda sample: self._on_cache(key, sample)), history=True
@@ -291,9 +306,19 @@ class ZenohSession:
 
         def take(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                put(key, self._read(reply.ok), reply.ok.timestamp)
+                put(key, self._read(reply.ok), reply.ok.timestamp, number_of(reply.ok))
 
         ask_newest(self._session, token, self._direct(take))
+
+    def _hear_numbers(self, key: str) -> None:
+        """Subscribes to what the publishers of a topic say of the numbers of their messages. A node on
+        rmw_zenoh drops messages where a connection is slow, also the last one of a latched topic."""
+        if key not in self._numbered:
+            with suppress(zenoh.ZError):  # the session is closed
+                self._numbered[key] = self._session.declare_subscriber(
+                    caches(self._declared.subscribe[key]),
+                    self._direct(lambda sample: self._on_number(key, sample)),
+                )
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
         """A handler that runs on Zenoh's receiving thread. It does nothing after `renew`."""
@@ -423,7 +448,13 @@ class ZenohSession:
         changes = self._inbox.drain(whole)
         if not self._is_final:  # a peer that waited for something to be a client of
             changes.link_up, changes.reopen = False, changes.link_up
-        for key, token in changes.caches:  # not in the callback, which must not query
+        # Not in the callbacks, which must not query.
+        for key, token in changes.caches:
+            if numbered_publisher(token):
+                self._hear_numbers(key)
+            self._ask_cache(key, token)
+        for key, token in changes.behind:
+            log.warning("a message of %s was lost on its way: its publisher is asked for it", key)
             self._ask_cache(key, token)
         return changes
 
@@ -450,8 +481,19 @@ class ZenohSession:
 
     def _on_cache(self, key: str, sample: zenoh.Sample) -> None:
         token = str(sample.key_expr)
-        if sample.kind == zenoh.SampleKind.PUT and not is_cache_of(token, self.zid):
+        if is_cache_of(token, self.zid):
+            return
+        if sample.kind == zenoh.SampleKind.PUT:
             self._inbox.cache(key, token)
+        else:
+            self._inbox.publisher_lost(key, numbered_publisher(token))
+
+    def _on_number(self, key: str, sample: zenoh.Sample) -> None:
+        token, number = str(sample.key_expr), sample.payload.to_bytes()
+        publisher = numbered_publisher(token)
+        if publisher and len(number) == NUMBER_BYTES:
+            last = Number(publisher, int.from_bytes(number, "little"))
+            self._inbox.last_number(key, token, last)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)

@@ -60,7 +60,8 @@ def panel_rules(use: PanelUse) -> list[Rule]:
     read_caches = tuple(map(caches, read))
     own_caches = _sorted(caches(declared.publish[key]) for key in declared.latched)
     inward, outward = partial(Rule, inward=True), partial(Rule, inward=False)
-    # A cache is asked by the name of its token, and answers by that of its topic.
+    # A cache is asked by the name of its token, and answers by that of its topic. Its publisher puts
+    # the number of its last message there.
     return [
         inward("commands", ("put", "reply"), expressions=sent),
         outward("command_subscribers", ("declare_subscriber",), expressions=sent),
@@ -68,8 +69,8 @@ def panel_rules(use: PanelUse) -> list[Rule]:
         outward("answers", ("reply", "declare_queryable"), expressions=(*asked, *use.admin)),
         inward("subscriptions", ("declare_subscriber",), expressions=read),
         outward("values", ("put", "reply"), expressions=read),
-        inward("latched_requests", ("query", *LOOK), expressions=read_caches),
-        outward("latched", ("declare_queryable", "liveliness_token"), expressions=read_caches),
+        inward("latched_requests", ("query", "declare_subscriber", *LOOK), expressions=read_caches),
+        outward("latched", ("declare_queryable", "liveliness_token", "put"), expressions=read_caches),
         inward("graph_requests", LOOK, expressions=use.graph),
         outward("graph", ("liveliness_token",), expressions=use.graph),
         inward("tokens", ("liveliness_token",), expressions=_sorted(use.tokens)),

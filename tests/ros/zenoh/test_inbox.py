@@ -1,10 +1,20 @@
 """What a link's threads put in, and what the event loop takes out: no Zenoh, no threads."""
 
+from collections.abc import Collection
 from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 
-from app.ros.zenoh.inbox import KEPT_BYTES, KEPT_MOST, UNSEEN_BYTES, UNSEEN_MOST, Inbox
+from app.ros.zenoh.inbox import (
+    KEPT_BYTES,
+    KEPT_MOST,
+    NUMBERS,
+    UNSEEN_BYTES,
+    UNSEEN_MOST,
+    Inbox,
+    Number,
+)
 from tests.budgets import check
 
 
@@ -129,6 +139,31 @@ def test_cached_sample_without_a_stamp_counts_before_any_publication(inbox: Inbo
     inbox.put("heard", b"new", None)
     inbox.put_cached("heard", b"cached", None)
     assert inbox.drain().samples["heard"].payload == b"new"
+
+
+TOKEN = "heard/@adv/pub/n1/7/_"
+
+
+def test_a_publisher_that_says_a_later_number_is_asked_for_what_was_lost(inbox: Inbox) -> None:
+    def said(value: int, publisher: str = "n1/7") -> tuple[Collection[Any], Collection[Any]]:
+        inbox.last_number("heard", TOKEN, Number(publisher, value))
+        changes = inbox.drain()
+        return changes.caches, changes.behind
+
+    assert said(0) == ([("heard", TOKEN)], []), "its first message did not come"
+    inbox.put("heard", b"true", Sent(1.0), Number("n1/7", NUMBERS - 1))
+    assert said(NUMBERS - 1) == ([], []), "nothing was lost"
+    assert said(NUMBERS - 2) == ([], []), "it was said late"
+    assert said(0) == ([], [("heard", TOKEN)]), "after the largest number comes 0"
+    inbox.put_cached("heard", b"false", Sent(1.5), Number("n1/7", 0))
+    sample = inbox.drain().samples["heard"]
+    assert (sample.payload, sample.cached) == (b"false", True)
+    assert said(0) == ([], [])
+    inbox.put("heard", b"true", Sent(2.0), Number("n1/7", 1))
+    inbox.put_cached("heard", b"false", Sent(1.5), Number("n1/7", 0))
+    assert inbox.drain().samples["heard"].payload == b"true", "it published while it was asked"
+    inbox.publisher_lost("heard", "n1/7")
+    assert said(5) == ([("heard", TOKEN)], []), "nothing is known of a publisher that came again"
 
 
 def test_a_cache_is_delivered_once_and_at_once(inbox: Inbox, woken: list[bool]) -> None:

@@ -50,7 +50,7 @@ def test_a_thread_of_pythons_own_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
     calls: list[int] = []
     api = SimpleNamespace(PyGILState_Ensure=lambda: calls.append(threading.get_native_id()))
     monkeypatch.setattr(session, "ctypes", SimpleNamespace(pythonapi=api))
-    monkeypatch.setattr(session, "_attached_threads", set())
+    monkeypatch.setattr(session, "_attached", threading.local())
     thread = threading.Thread(target=attach)
     thread.start()
     thread.join(5)
