@@ -13,6 +13,7 @@ Built = TypeVar("Built")
 
 RESTART_S: Final = 1.0  # from the failure of a task that is kept running to its next start
 RESTART_MOST_S: Final = 30.0
+_spawned: Final[set["asyncio.Task[None]"]] = set()  # the event loop alone keeps no task alive
 
 
 def spawn_logged(
@@ -21,10 +22,12 @@ def spawn_logged(
     """Starts `work` as a task. An exception in it is logged as `failure`."""
 
     def done(task: "asyncio.Task[None]") -> None:
+        _spawned.discard(task)
         if not task.cancelled() and (error := task.exception()):
             log.error(failure, exc_info=error)
 
     task = asyncio.get_running_loop().create_task(work)
+    _spawned.add(task)
     task.add_done_callback(done)
     return task
 

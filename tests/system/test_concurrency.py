@@ -2,8 +2,10 @@
 
 import ast
 import asyncio
+import gc
 import logging
 import time
+import weakref
 from collections.abc import Iterator
 from typing import Final, TypeGuard
 
@@ -34,6 +36,29 @@ async def _drained_when_the_last_one_ends() -> None:
         assert not drained.done()
     async with asyncio.timeout(1):
         await drained
+
+
+def test_a_spawned_task_that_nothing_else_knows_of_goes_on() -> None:
+    """The event loop alone does not keep it: it vanished while it waited."""
+    futures: list[weakref.ref[asyncio.Future[None]]] = []
+
+    async def waits() -> None:
+        future = asyncio.get_running_loop().create_future()
+        futures.append(weakref.ref(future))
+        await future
+        futures.clear()
+
+    async def scene() -> None:
+        spawn_logged(waits(), LOG, "waiting failed")
+        await turns()
+        gc.collect()
+        (kept,) = (future() for future in futures)
+        assert kept is not None
+        kept.set_result(None)
+        await turns()
+        assert futures == []
+
+    asyncio.run(scene())
 
 
 def test_draining_ends_with_its_time() -> None:
