@@ -24,6 +24,8 @@ Situation = Literal[
 OF_INTERLOCK: Final[Sequence[Situation]] = (
     "never_seen", "permits", "forbids", "old", "other_type", "publisher_gone", "robot_lost",
 )  # fmt: skip
+# Those in which a confirmation by a person is wrong; the last one where it takes two.
+WRONGLY_CONFIRMED: Final[Sequence[Situation]] = ("unconfirmed", "wrong_pin", "same_person")
 MOST_WAITED_S: Final = 30.0  # for an alarm
 ENTRY: Final = "1"  # the code of an alarm that is an entry of a list: also a number
 HoldEnd = Literal["released", "page_gone", "no_beat", "forbids", "link_cut"]
@@ -107,6 +109,11 @@ class Plan:
         return [guarded for guarded in self.controls.values() if guarded.confirmation]
 
     @property
+    def has_confirmations(self) -> bool:
+        """Whether a person confirms a press or an act on an alarm."""
+        return bool(self.confirmed) or any(alarm.confirm_act for alarm in self.alarms)
+
+    @property
     def personas(self) -> Sequence[Persona]:
         """The users who are needed to try the roles of all controls."""
         users = [user for guarded in self.controls.values() for user in (guarded.enough, guarded.less)]
@@ -144,6 +151,11 @@ def situations(interlock: Interlock, robot: str) -> Iterator[Situation]:
         yield situation
 
 
+def wrong_confirmations(confirmation: Confirmation) -> Sequence[Situation]:
+    """The situations in which a confirmation is wrong."""
+    return WRONGLY_CONFIRMED if confirmation == "two_persons" else WRONGLY_CONFIRMED[:-1]
+
+
 def plan_of(panel: Panel, robot: str = "") -> Plan:
     """The plan for the robot without a name, or for the `robot` (its id) whose panel this is
     (`panel_of`)."""
@@ -163,8 +175,6 @@ def plan_of(panel: Panel, robot: str = "") -> Plan:
             left_out[f"alarm {alarm.id}"] = why
         else:
             alarms.append(alarm)
-        if alarm.confirm_act and alarm.ack == "required":
-            left_out[f"acknowledging alarm {alarm.id}"] = "a person confirms it with a PIN"
     chosen = [each for name, each in interlocks.items() if name in used]
     return Plan(robot, controls, interlocks, rounds(chosen, controls), tuple(alarms), left_out)
 

@@ -15,7 +15,6 @@ from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import quote
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -52,6 +51,7 @@ from app.tools.prove.cases import (
     names_interlock,
     plan_of,
     situations,
+    wrong_confirmations,
 )
 from app.tools.prove.result import Proof, Result
 from app.tools.prove.rig import HOLDER, Rig
@@ -149,7 +149,7 @@ class _Round:
         self._tell = tell
         self._robots = ProvingRobots(panel, robot)
         self._robot = self._robots.own
-        if plan.confirmed:
+        if plan.has_confirmations:
             users = (*users, HOLDER)
         self._rig = Rig(panel, self._robots, folder / "data", users=users)
         self._panel = panel = panel_of(panel, robot or None)
@@ -444,15 +444,9 @@ class _Round:
     def _unconfirmed(self, guarded: Guarded) -> None:
         """A press is refused without a confirmation, and with one that was not given."""
         name, values = str(guarded.control.id), self._values(guarded)
-        confirm = partial(self._rig.confirm, name, values, guarded.confirmation)
-        tried: dict[Situation, Callable[[], str]] = {
-            "unconfirmed": lambda: "",
-            "wrong_pin": lambda: confirm(right=False),
-        }
-        if guarded.confirmation == "two_persons":
-            tried["same_person"] = lambda: confirm(second=HOLDER)
-        for situation, confirmation in tried.items():
-            self._report(name, "", situation, self._refuses(guarded, confirmation()))
+        for situation in wrong_confirmations(guarded.confirmation):
+            confirmation = self._rig.confirm(name, values, guarded.confirmation, situation)
+            self._report(name, "", situation, self._refuses(guarded, confirmation))
 
     def _cut_off(self, guarded: Guarded, situation: Situation, began: float, guard: str = "") -> None:
         name = str(guarded.control.id)
@@ -654,15 +648,20 @@ class _Round:
         return "" if is_over else f"it does not return: {self._alarm_state(alarm)}"
 
     def _acknowledged(self, alarm: Alarm) -> str:
-        if alarm.ack == "none" or alarm.confirm_act:
+        """That it can be acknowledged, with `confirm_act` only where a person confirms it; "" if so."""
+        if alarm.ack == "none":
             return ""
-        row = self._alarm_row(alarm)
-        body = {"occurrence": row.get("occurrence", 0)}
-        status, answer = self._rig.request(
-            "POST", f"/alarms/{quote(self._alarm_key(alarm))}/acknowledge", body
-        )
-        done = status == 200 and self._alarm_row(alarm).get("acknowledged") is True
-        return "" if done else f"it can't be acknowledged: {answer}"
+        key, confirmation = self._alarm_key(alarm), alarm.confirm_act or ""
+        acknowledge = partial(self._rig.acknowledge, key, self._alarm_row(alarm).get("occurrence", 0))
+        for wrong in wrong_confirmations(confirmation) if confirmation else ():
+            status = acknowledge(confirmation, wrong)[0]
+            fault = f"it is acknowledged ({status})" if self._is_acknowledged(alarm) else ""
+            self._report(str(alarm.id), "", wrong, fault, kind="alarm")
+        answer = acknowledge(confirmation)
+        return "" if self._is_acknowledged(alarm) else f"it can't be acknowledged: {answer}"
+
+    def _is_acknowledged(self, alarm: Alarm) -> bool:
+        return self._alarm_row(alarm).get("acknowledged") is True
 
     def _alarm_key(self, alarm: Alarm) -> str:
         key, entry = alarm_key(str(alarm.id), self._robot_name), entry_of(alarm)

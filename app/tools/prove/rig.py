@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import quote, urlencode
 
 import uvicorn
 from fastapi import FastAPI
@@ -35,7 +36,7 @@ from app.panel.widgets.parameter import GET
 from app.ros.messages import load_interfaces
 from app.system.errors import KioskError
 from app.system.settings import Settings
-from app.tools.prove.cases import Persona
+from app.tools.prove.cases import Persona, Situation
 from app.tools.prove.robot import ProvingRobots
 from app.tools.prove.shown import Shown, read_events
 from app.tools.simulator.zenoh import ANY_PORT, Simulator, way_of
@@ -47,6 +48,7 @@ from app.web.application import (
     page_assets,
     page_revision,
 )
+from app.web.requests import FORM
 from app.web.server import OPTIONS
 
 log = logging.getLogger("kiosk.prove")
@@ -248,20 +250,48 @@ class Rig:
         control: str,
         inputs: Mapping[str, Any],
         confirmation: Confirmation,
-        *,
-        right: bool = True,
-        second: Persona = SECOND,
+        wrong: Situation | None = None,
     ) -> str:
-        """The confirmation of a press by the user who is signed in, or by a second one, with the
-        `right` PIN or a wrong one; "" if it is refused."""
-        by = name_of(second) if confirmation == "two_persons" else self._user
-        pin = self._pins.get(by, "")
-        wrong = f"{(int(pin or 0) + 1) % 1_000_000:06}"
-        body = {"inputs": dict(inputs), "pin": pin if right else wrong}
-        if confirmation == "two_persons":
-            body["user"] = by
+        """The confirmation of a press by the user who is signed in, or by a second one; "" if it is
+        refused. `wrong` is one of `wrong_confirmations`."""
+        if wrong == "unconfirmed":
+            return ""
+        second, pin = self._entered(confirmation, wrong)
+        body = {"inputs": dict(inputs), "pin": pin} | ({"user": second} if second else {})
         answer = self.request("POST", f"{self.root}/widgets/{control}/confirm", body)[1]
+        if wrong == "wrong_pin":  # a success forgets the failure, of which too many delay what follows
+            self.confirm(control, inputs, confirmation)
         return str(answer.get("confirmation", ""))
+
+    def _entered(self, confirmation: Confirmation, wrong: Situation | None) -> tuple[str, str]:
+        """The second person, "" where the user who is signed in confirms, and a PIN."""
+        second = ""
+        if confirmation == "two_persons":
+            second = self._user if wrong == "same_person" else name_of(SECOND)
+        pin = self._pins.get(second or self._user, "")
+        return second, f"{(int(pin or 0) + 1) % 1_000_000:06}" if wrong == "wrong_pin" else pin
+
+    def acknowledge(
+        self,
+        alarm: str,
+        occurrence: int,
+        confirmation: Confirmation = "",
+        wrong: Situation | None = None,
+    ) -> tuple[int, dict[str, Any]]:
+        """Acknowledges an alarm over HTTP, past the page; what a person confirms by the form of the
+        sheet. `wrong` as in `confirm`: without a confirmation it is tried in each way. The status and
+        what `request` returns, of the last try."""
+        path = f"/alarms/{quote(alarm, safe='')}/acknowledge"
+        if not confirmation or wrong == "unconfirmed":
+            self.request("POST", "/alarms/acknowledge", {"alarms": {alarm: occurrence}})
+            answer = self.request("POST", path, {"occurrence": occurrence})
+            if not confirmation:
+                return answer
+        form = {"occurrence": str(occurrence)}
+        if wrong != "unconfirmed":
+            second, pin = self._entered(confirmation, wrong)
+            form |= {"_enter": "yes", "_pin": pin} | ({"_user": second} if second else {})
+        return self._exchange("POST", path, urlencode(form), self.cookie)[:2]
 
     @contextmanager
     def signed_in(self, persona: Persona) -> Iterator[None]:
@@ -306,24 +336,29 @@ class Rig:
     def request(
         self, method: str, path: str, body: Mapping[str, Any] | None = None, cookie: str = ""
     ) -> tuple[int, dict[str, Any]]:
-        """A request with JSON; its status and its JSON, {} for another answer."""
+        """A request with JSON; its status and its JSON, of a redirect its "location", {} for another
+        answer."""
         return self._exchange(method, path, body, cookie or self.cookie)[:2]
 
     def _exchange(
-        self, method: str, path: str, body: Mapping[str, Any] | None, cookie: str
+        self, method: str, path: str, body: Mapping[str, Any] | str | None, cookie: str
     ) -> tuple[int, dict[str, Any], str]:
-        """The same with the cookies that it sets."""
+        """The same with the cookies that it sets. A text is that of a form."""
+        is_form = isinstance(body, str)
+        content = body if body is None or isinstance(body, str) else json.dumps(body)
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ANSWER_WITHIN_S)
         try:
             headers = {
-                "accept": "application/json", "content-type": "application/json",
+                "accept": "application/json", "content-type": FORM if is_form else "application/json",
                 "cookie": cookie,
             }  # fmt: skip
-            connection.request(method, path, json.dumps(body) if body is not None else None, headers)
+            connection.request(method, path, content, headers)
             answer = connection.getresponse()
             text = answer.read()
         finally:
             connection.close()
+        if location := answer.getheader("location"):
+            return answer.status, {"location": location}, cookies_of(answer)
         try:
             return answer.status, json.loads(text), cookies_of(answer)
         except ValueError:

@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 
 from app.cell.alarms import sources
-from app.cell.commands import holds, presses
+from app.cell.commands import alarm_acts, holds, presses
 from app.cell.commands.judge import PressJudge
 from app.cell.people import access, confirmer
+from app.cell.people.access import USER
 from app.cell.permission import conditions, interlocks, press_permission
 from app.cell.permission.verdict import PERMITTED, Verdict
 from app.panel import Panel, load_panel
@@ -19,6 +20,8 @@ from app.tools.prove import proof as proving
 from app.tools.prove.cases import plan_of
 from app.tools.prove.proof import prove
 from app.tools.prove.result import Proof
+from app.tools.prove.rig import HOLDER, Rig
+from app.tools.prove.robot import ProvingRobots
 
 PANEL = """
 title = "Cell"
@@ -181,8 +184,23 @@ confirm_press = "pin"
 id = "door"
 label = "Door"
 topic = "/door"
+[[alarm]]
+id = "hot"
+text = "Too hot"
+topic = "/oven"
+type = "std_msgs/msg/Float64"
+high = 80.0
+confirm_act = "pin"
+[[alarm]]
+id = "smoke"
+topic = "/faults"
+type = "diagnostic_msgs/msg/DiagnosticArray"
+list = { field = "status", code = "name", text = "message", level = "level" }
+confirm_act = "two_persons"
 """
 CONFIRMATIONS = {
+    ("hot", "unconfirmed"), ("hot", "wrong_pin"), ("hot", "raised"),
+    ("smoke", "unconfirmed"), ("smoke", "wrong_pin"), ("smoke", "same_person"), ("smoke", "raised"),
     ("heat", "unconfirmed"), ("heat", "wrong_pin"),
     ("bypass", "unconfirmed"), ("bypass", "wrong_pin"), ("bypass", "same_person"),
     ("jog", "unconfirmed"), ("jog", "wrong_pin"),
@@ -207,10 +225,18 @@ def test_roles_and_confirmations_are_tried_by_users_of_the_proof(oven: Panel) ->
         assert (control, "permits") in tried
 
 
+def test_wrong_pins_delay_nothing_that_is_tried_next(oven: Panel, tmp_path: Path) -> None:
+    with Rig(oven, ProvingRobots(oven, ""), tmp_path / "data", users=[HOLDER]) as rig:
+        for _ in range(USER.free + 1):
+            assert rig.confirm("heat", {}, "pin", "wrong_pin") == ""
+        assert rig.confirm("heat", {}, "pin")
+
+
 # The same for roles and confirmations.
 OPEN_TO_ALL: dict[str, tuple[Any, str, Any]] = {
     "a role is not judged": (press_permission, "role_verdict", always(None)),
     "a press needs no confirmation": (press_permission, "unconfirmed", always(None)),
+    "an act on an alarm needs no confirmation": (alarm_acts, "unconfirmed", always(None)),
     "any PIN is right": (access, "matches", always(True)),
     "one person is two": (confirmer, "_same_person", always(None)),
 }
