@@ -143,9 +143,9 @@ class Recorded:
         self._looked_at: float | None = None
         add, put = Inbox.put, ZenohSession.put
 
-        def added(inbox: Inbox, key: str, payload: Any, stamp: Any) -> None:
+        def added(inbox: Inbox, key: str, payload: Any, *sent: Any) -> None:
             before = time.monotonic()
-            add(inbox, key, payload, stamp)
+            add(inbox, key, payload, *sent)
             if key == "operation_enabled":  # one that is just being added is a doubt: it may be sent
                 permitted = bytes(payload)[4] == 1
                 self.came.append((before if permitted else time.monotonic(), permitted))
