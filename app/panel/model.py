@@ -46,7 +46,7 @@ from app.panel.widgets.templated import is_stop
 from app.panel.widgets.tour import PATH_TYPE, Tour
 from app.system.errors import NotFound
 from app.system.pictures import picture_files, shipped_pictures
-from app.system.texts import PanelText
+from app.system.texts import PanelText, TextLike
 from app.system.texts.catalogue import files
 
 if TYPE_CHECKING:
@@ -135,6 +135,11 @@ class Panel(PanelKeys):
         yield from self.frame_widgets
         yield from self.recipe_loads
         yield from (robot.figure for robot in self.robots if robot.figure)
+
+    @property
+    def robot_names(self) -> dict[str, TextLike]:
+        """The names of its robots by their ids, in the order of the file; {} without `[[robot]]`."""
+        return {str(robot.id): robot.name for robot in self.robots}
 
     @property
     def site_cell(self) -> str:

@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.test_accessibility import violations
 from tests.browser.test_places_in_browser import card, chosen, opened, touch_and_drag
-from tests.support.browser.pages import widget
+from tests.support.browser.pages import widget, without_its_time
 from tests.support.parts import Server, until
 from tests.support.servers import demo_server
 from tests.web.test_saved_places import SAVES
@@ -20,11 +20,6 @@ def shuttle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with demo_server(tmp_path_factory.mktemp("shuttle"), SAVES) as server:
         until(lambda: server.widget("hall")["state"] == "live", "the map is there")
         yield server
-
-
-def without_its_time(page: Page) -> None:
-    """The page as one that was opened a while ago: a press soon after it counts as a second tap."""
-    page.evaluate("document.querySelectorAll('[name=_since]').forEach((field) => field.remove())")
 
 
 def test_a_place_is_named_by_the_keyboard_of_the_screen_saved_and_deleted(

@@ -66,6 +66,20 @@ priority = 3
 "/speed" = { values = [8.0] }
 """
 
+TWO_ROBOTS = PANEL.replace('languages = ["en", "ja"]', 'languages = ["en", "ja", "de"]').replace(
+    "[[page]]",
+    """[[robot]]
+id = "left"
+name = { en = "Left", ja = "左", de = "Links" }
+namespace = "/left"
+[[robot]]
+id = "right"
+name = { en = "Right", ja = "右", de = "Rechts" }
+namespace = "/right"
+[[page]]""",
+    1,
+)
+
 
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
@@ -84,6 +98,11 @@ def figures(server: Server) -> dict[str, Any]:
 
 def ended(server: Server) -> list[dict[str, Any]]:
     return [stop for stop in figures(server)["stops"] if stop["ended"] and stop["key"]]
+
+
+def asked_stops(server: Server) -> list[dict[str, Any]]:
+    asked = server.snapshot()["alarms"]["asked"]
+    return asked["stops"] if asked else []
 
 
 def give(server: Server, key: str, reason: str) -> dict[str, Any]:
@@ -188,24 +207,55 @@ def test_what_is_no_reason_is_refused(cell: Server) -> None:
 
 
 def test_open_reasons_are_asked_together_before_the_shift_ends(tmp_path: Path) -> None:
-    def line() -> dict[str, Any]:
-        return server.snapshot()["alarms"]["asked"] or {"began": []}
+    def line() -> list[dict[str, Any]]:
+        return asked_stops(server)
 
     with demo_server(tmp_path, PANEL, app="tests.support.apps.shift_end:app") as server:
         until(lambda: ended(server), "the machine has stood still", within_s=20)
         first = ended(server)[0]["key"]
         assert give(server, first, "")["outcome"] == "succeeded"
-        until(lambda: len(line()["began"]) > 1, "it is asked together", within_s=60)
+        until(lambda: len(line()) > 1, "it is asked together", within_s=60)
         location = server.http.get("/stops/asked").headers["location"]
         assert location == "/oee?shift=this&open=1"
         page = server.http.get(location).text
         listed = re.findall(r'class="answer" href="/stops/([a-z0-9-]+)#reasons"', page)
         assert first in listed
-        before = len(line()["began"])
+        before = len(line())
         assert give(server, first, "material")["outcome"] == "succeeded"
-        until(lambda: len(line()["began"]) < before, "one less is asked")
+        until(lambda: len(line()) < before, "one less is asked")
         page = server.http.get(location).text
         assert f'class="answer" href="/stops/{first}#reasons"' not in page
+
+
+def test_open_reasons_of_all_robots_are_asked_together(tmp_path: Path) -> None:
+    """Each robot's stops stand under its name. The stops of one robot do not take away the question
+    about the other's."""
+
+    def robots() -> set[str]:
+        return {stop["robot"] for stop in asked_stops(left)}
+
+    def listed(of_server: Server) -> dict[str, list[str]]:
+        parts = re.split(r'class="of-robot"[^>]*>([^<]+)<', of_server.http.get(address).text)[1:]
+        keys = re.compile(r'class="answer" href="/stops/([a-z0-9-]+)#reasons"')
+        return {name: keys.findall(rows) for name, rows in zip(parts[::2], parts[1::2], strict=True)}
+
+    with demo_server(tmp_path, TWO_ROBOTS, app="tests.support.apps.shift_end:app") as server:
+        left = server.robot("left")
+        until(lambda: robots() == {"left", "right"}, "both are asked together", within_s=60)
+        address = server.http.get("/stops/asked").headers["location"]
+        assert re.fullmatch(r"/oee\?shift=this&robot=(left|right)&open=1#stops", address)
+        line = re.search(r'data-text="times">([^<]+)<', server.http.get("/robots/left/pages/main").text)
+        assert line
+        assert re.fullmatch(r"Left: \d+, Right: \d+\. Say why before the shift ends\.", line[1])
+        keys = listed(server)
+        assert [*keys] == ["Left", "Right"]
+        assert not set(keys["Left"]) & set(keys["Right"])
+        for name, of_robot in keys.items():
+            assert f"<b>{name}</b>" in server.http.get(f"/stops/{of_robot[0]}").text
+            assert give(server, of_robot[0], "material")["outcome"] == "succeeded"
+        rest = listed(server)
+        assert not {keys[name][0] for name in keys} & {key for of in rest.values() for key in of}
+        until(lambda: robots() == {"left", "right"}, "both are asked about their next stops")
 
 
 def test_who_may_not_answer_is_told_why(tmp_path: Path) -> None:

@@ -440,14 +440,23 @@ class PriorityCount(TypedDict):
     raised: int
 
 
-class AskedReason(TypedDict):
-    """The question why a robot stood still from each time of `began` (seconds since the epoch) on.
-    Of one stop `text` says for how long, `times` from when to when."""
+class OpenStop(TypedDict):
+    """A stop without a reason: that of a robot ("" for the only one) which began at `began` (seconds
+    since the epoch)."""
 
     robot: str
-    began: list[float]
+    began: float
+
+
+class AskedReason(TypedDict):
+    """The question why robots stood still. Of one stop `text` says for how long, `times` from when to
+    when. `shift_ends` (seconds since the epoch) is the end of the shift shortly before which it is
+    asked, 0 for one that is asked earlier."""
+
+    stops: list[OpenStop]
     text: TextLike
     times: TextLike
+    shift_ends: float
 
 
 class AlarmsView(TypedDict):
@@ -457,7 +466,7 @@ class AlarmsView(TypedDict):
     raises since the server's start that are to be acknowledged. The shelved, suppressed and those out
     of service are counted apart. `rows` has the first `MAX_ROWS` by their ids, and `more` is how many
     follow, `more_text` the same as a sentence, "" for none. `fault`: why they are not kept on the disk,
-    "" if they are. `asked` is the newest stop whose reason is asked, None for none."""
+    "" if they are. `asked` is the question for the reasons of stops, None for none."""
 
     line: AlarmRow | None
     standing: int

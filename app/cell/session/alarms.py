@@ -354,7 +354,7 @@ class Alarms:
         self._seq = 0
         self._overrun: dict[str, None] = {}  # ids of alarms of which a change found no room
         self._fault: TextLike = ""
-        self.asked: AskedReason | None = None  # the newest stop whose reason is asked
+        self.asked: AskedReason | None = None  # the question for reasons of stops
         self._shown = AlarmTable(AlarmMarks(panel))
         self._view: AlarmsView | None = NO_ALARMS  # None: to be made
         self._robots: list[RobotAlarms] = []

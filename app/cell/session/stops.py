@@ -1,6 +1,7 @@
 """Reads stops and their stories from the stores of a panel, when they are asked for."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -9,11 +10,13 @@ from typing import Any, Final, Protocol
 
 from app.cell.alarms.history import MAX_PAGE, NEWEST, HistoryFilter, HistoryRow, history_rows, reading
 from app.cell.alarms.report import CountRow, read_counts, read_states, shift_at
-from app.cell.alarms.shown import AskedReason
+from app.cell.alarms.shown import AskedReason, OpenStop
 from app.cell.commands.shift_acts import REASON_ACTION
 from app.cell.session.fleet import Fleet
+from app.cell.session.state_recorder import ASK_BEFORE_END_S
 from app.cell.stops.changes import Change, ChangeFilter, read_changes
 from app.cell.stops.oee import (
+    MOST_OPEN,
     SAME_S,
     Answer,
     AnsweredStop,
@@ -25,6 +28,7 @@ from app.cell.stops.oee import (
     answer_of,
     answered,
     break_spans,
+    open_stops,
     quantities,
     shift_figures,
     spells,
@@ -50,7 +54,7 @@ from app.panel.model import Panel
 from app.records import Filter, LogRow, NullLog, OperatorLog
 from app.system.clock import format_time
 from app.system.errors import NotFound
-from app.system.texts import number, say
+from app.system.texts import TextLike, joined, number, say
 
 MOST_STOPS: Final = 200
 KEY_S: Final = 2.0  # a state is recorded so much later than its change at most
@@ -267,42 +271,82 @@ def _stood(
 
 
 def ask_reason(fleet: Fleet, robot: str, since: float, until: float) -> None:
-    """Asks why a robot stood still from `since` to `until`, unless it was short or a break."""
+    """Asks why a robot stood still from `since` to `until`, unless it was short or a break: shortly
+    before the shift ends together with what is asked of other robots, else in its place."""
     rules, span = fleet.panel.oee, Span(since, until)
     if rules is None or not rules.reasons:
         return
     if total(without(span, break_spans(span, rules.breaks))) < rules.reason_after_s:
         return
-    text = say("oee_stood_still", duration=duration_text(float(round(until - since))))
+    names, stops = fleet.panel.robot_names, [OpenStop(robot=robot, began=since)]
+    question = fleet.alarms.asked
+    others = [stop for stop in question["stops"] if stop["robot"] != robot] if question else []
+    if question is not None and others and until < question["shift_ends"]:
+        stops = [*question["stops"], *stops][-MOST_OPEN:]
+        fleet.alarms.ask(asked_together(names, stops, question["shift_ends"]))
+        return
+    duration = duration_text(float(round(until - since)))
+    text = say("oee_stood_still", duration=duration)
+    if len(names) > 1:
+        text = say("oee_robot_stood_still", robot=names[robot], duration=duration)
     times = say("oee_from_to", since=format_time(since), until=format_time(until))
-    fleet.alarms.ask(AskedReason(robot=robot, began=[since], text=text, times=times))
+    ends = shift_at(until, fleet.panel.alarm_rules.shifts).until
+    shift_ends = ends if until >= ends - ASK_BEFORE_END_S else 0.0
+    fleet.alarms.ask(AskedReason(stops=stops, text=text, times=times, shift_ends=shift_ends))
 
 
 async def ask_open_reasons(fleet: Fleet, log: OperatorLog | NullLog, now: float) -> None:
-    """Asks before the end of a shift for the reasons of its stops that have none, as those that were
-    left for later: of one robot, the first that has some. LogError and TooMany as of `figures_of`."""
+    """Asks before the end of a shift for the reasons of the stops of all robots that have none, as
+    those that were left for later. LogError and TooMany as of `figures_of`."""
     shift = shift_at(now, fleet.panel.alarm_rules.shifts)
-    for session in fleet.sessions:
-        robot = session.entry.id if session.entry else ""
-        figures = await figures_of(fleet, log, robot, shift.since, now)
-        if began := [stop.stop.standstill.since for stop in figures.open]:
-            fleet.alarms.ask(_asked_together(robot, began))
-            return
+    figures = await figures_of_all(fleet, log, shift.since, now)
+    stops = [
+        OpenStop(robot=robot, began=time.stop.standstill.since) for robot, time in open_stops(figures)
+    ]
+    if stops:
+        fleet.alarms.ask(asked_together(fleet.panel.robot_names, stops, shift.until))
 
 
-def _asked_together(robot: str, began: list[float]) -> AskedReason:
-    text, times = say("oee_open_count", count=number(str(len(began)))), say("oee_before_end")
-    return AskedReason(robot=robot, began=began, text=text, times=times)
+def asked_together(
+    names: Mapping[str, TextLike], stops: list[OpenStop], shift_ends: float
+) -> AskedReason:
+    """The question for the reasons of stops before a shift ends. `names` are those of the panel's
+    robots by their ids: with several it says how many stops each has."""
+    text, times = say("oee_open_count", count=number(str(len(stops)))), say("oee_before_end")
+    if len(names) > 1:
+        counts = Counter(stop["robot"] for stop in stops)
+        parts = [
+            say("oee_open_robot", robot=name, count=number(str(counts[robot])))
+            for robot, name in names.items()
+            if counts[robot]
+        ]
+        times = say("oee_before_end_robots", robots=joined(parts, "between_names"))
+    return AskedReason(stops=stops, text=text, times=times, shift_ends=shift_ends)
 
 
 def reason_given(fleet: Fleet, robot: str, since: float) -> None:
     """The reason of a stop was given, or left for later: it is not asked any more."""
     question = fleet.alarms.asked
-    if question is None or question["robot"] != robot:
+    if question is None:
         return
-    began = [each for each in question["began"] if abs(each - since) > SAME_S]
-    if len(began) < len(question["began"]):
-        fleet.alarms.ask(_asked_together(robot, began) if began else None)
+    stops = [
+        stop
+        for stop in question["stops"]
+        if stop["robot"] != robot or abs(stop["began"] - since) > SAME_S
+    ]
+    if len(stops) < len(question["stops"]):
+        rest = asked_together(fleet.panel.robot_names, stops, question["shift_ends"])
+        fleet.alarms.ask(rest if stops else None)
+
+
+async def figures_of_all(
+    fleet: Fleet, log: OperatorLog | NullLog, since: float, until: float
+) -> dict[str, ShiftFigures]:
+    """Those of each robot whose panel has `[oee]`, by its id, "" for the only one. Errors as of
+    `figures_of`."""
+    counted = [session.entry for session in fleet.sessions if session.panel.oee is not None]
+    robots = [str(entry.id) if entry else "" for entry in counted]
+    return {robot: await figures_of(fleet, log, robot, since, until) for robot in robots}
 
 
 async def figures_of(

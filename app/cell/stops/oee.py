@@ -7,7 +7,7 @@ apart, and never guessed.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Final, Literal, NamedTuple
@@ -84,6 +84,13 @@ class StopTime(NamedTuple):
     stop: AnsweredStop
     seconds: float
     is_short: bool
+
+
+class RobotStop(NamedTuple):
+    """A stop in a shift, of the robot with this id ("" for the only one)."""
+
+    robot: str
+    time: StopTime
 
 
 class ReasonTime(NamedTuple):
@@ -171,6 +178,14 @@ class ShiftFigures:
             and not stop.is_short
         )
         return tuple(without)[-MOST_OPEN:]
+
+
+def open_stops(figures: Mapping[str, ShiftFigures]) -> list[RobotStop]:
+    """The newest stops of all robots that are over and have no reason, in the order of their begin.
+    `figures` are those of a shift by the robot's id."""
+    stops = [RobotStop(robot, each) for robot, of_robot in figures.items() for each in of_robot.open]
+    stops.sort(key=lambda stop: stop.time.stop.standstill.since)
+    return stops[-MOST_OPEN:]
 
 
 # Spans of time.

@@ -218,7 +218,8 @@ def _add_story(
         return
     with parcel.attempt(*names), _reading(settings, panel) as reader:
         story, end = asyncio.run(_told(reader, moment.key))
-        context = story_context(story, end, reader.names(story.stop.robot), True, language)
+        own, robots = reader.names(story.stop.robot), panel.robot_names
+        context = story_context(story, end, own, robots, True, language)
         templates = PageTemplates(shipped_path("templates"), compiled=shipped_path(COMPILED))
         html = templates.render(TEMPLATE, language, panel=panel, **context)
         parcel.add(names[0], "why the machine stopped, to read and to print", html)

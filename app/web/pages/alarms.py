@@ -150,7 +150,7 @@ def choice_context(panel: Panel, choice: AlarmChoice, rows: Iterable[AlarmRow]) 
     states = [(show, say(code)) for show, code in SHOW_WORDS.items()]
     priorities = [say(code) for code in PRIORITY_WORDS[1:]]
     groups = {str(alarm.group): alarm.group for alarm in panel.alarms if alarm.group}
-    robots = {str(robot.id): robot.name for robot in panel.robots}
+    robots = panel.robot_names
     filtered: list[TextLike] = []
     if choice.show not in SEGMENTS:
         filtered.append(dict(states)[choice.show])

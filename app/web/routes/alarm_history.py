@@ -240,7 +240,7 @@ def history_context(
         ],
         priorities=[say(code) for code in PRIORITY_WORDS[1:]],
         groups=_groups(panel),
-        robots={str(robot.id): robot.name for robot in panel.robots},
+        robots=panel.robot_names,
         days=list(events_by_day(shown_events(rows))),
         count=_count(shown, len(rows)),
         order=word("clock_was_set_back" if shown.set_back else "clock_never_set_back"),

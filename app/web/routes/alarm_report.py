@@ -183,7 +183,7 @@ def report_context(
             for back, name in enumerate(SHIFTS)
             for chosen in [name == form.shift and not form.has_times]
         ],
-        robots={str(robot.id): robot.name for robot in panel.robots},
+        robots=panel.robot_names,
         span=span_text(shift),
         figures=list(_figures(parts.figures, len(presses))),
         states=list(_durations(parts.states, fills)),

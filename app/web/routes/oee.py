@@ -10,8 +10,16 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.cell.alarms.records import text_of
 from app.cell.alarms.report import Shift, shift_at
-from app.cell.session.stops import figures_of
-from app.cell.stops.oee import NOT_ANSWERED, SHORT, ReasonTime, ShiftFigures, StopTime, state_text
+from app.cell.session.stops import figures_of, figures_of_all
+from app.cell.stops.oee import (
+    NOT_ANSWERED,
+    SHORT,
+    ReasonTime,
+    ShiftFigures,
+    StopTime,
+    open_stops,
+    state_text,
+)
 from app.cell.view.times import duration_text
 from app.panel.rules import OeeRules
 from app.system.clock import format_time, iso_time
@@ -34,7 +42,7 @@ MINUTE_S: Final = 60.0
 
 class OeeQuery(BaseModel):
     """`robot` is the one whose figures are shown, by default the first. With `open` the page lists the
-    stops whose reason is not known, else the longest."""
+    stops of all robots whose reason is not known, else the longest of this one."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -86,6 +94,13 @@ class ShownStop(NamedTuple):
     asks: bool
 
 
+class ListedStops(NamedTuple):
+    """The stops of one robot in the table. `robot` is its name, "" where no others can be listed."""
+
+    robot: TextLike
+    stops: list[ShownStop]
+
+
 class OeeContext(TypedDict):
     """The variables of `oee.html`, beside those of the frame."""
 
@@ -101,7 +116,7 @@ class OeeContext(TypedDict):
     reasons: list[ShownReason]
     table: TextLike
     has_open: bool
-    listed: list[ShownStop]
+    listed: list[ListedStops]
     lacks: list[TextLike]
     alarm_word: Any
     word: Any
@@ -182,7 +197,9 @@ async def oee_page(
     rules, shift, figures = await _figures(state, form, now)
     path = f"/oee?shift={form.shift}" + (f"&robot={form.robot}" if form.robot else "")
     page = FramedPage("oee.html", word("title"), path, "alarms")
-    return framed_page(request, state, page, oee_context(state, form, rules, shift, figures, now))
+    listed = await _listed(state, form, rules, shift, figures, now)
+    context = oee_context(state, form, rules, shift, figures, listed, now)
+    return framed_page(request, state, page, context)
 
 
 @router.get(
@@ -231,12 +248,38 @@ async def _figures(state: AppState, form: OeeQuery, now: float) -> tuple[OeeRule
     return panel.oee, shift, figures
 
 
+async def _listed(
+    state: AppState,
+    form: OeeQuery,
+    rules: OeeRules,
+    shift: Shift,
+    figures: ShiftFigures,
+    now: float,
+) -> list[ListedStops]:
+    """The table of stops: of all robots those without a reason, or the longest of the one in
+    `figures`."""
+    names = state.fleet.panel.robot_names
+    listed: list[tuple[TextLike, Sequence[StopTime]]]
+    listed = [("", figures.open if form.open else figures.longest)]
+    if form.open and len(names) > 1:
+        until = min(shift.until, now)
+        opened = open_stops(await figures_of_all(state.fleet, state.log, shift.since, until))
+        listed = [
+            (name, [stop.time for stop in opened if stop.robot == robot])
+            for robot, name in names.items()
+        ]
+    return [
+        ListedStops(robot, [_shown(stop, rules) for stop in stops]) for robot, stops in listed if stops
+    ]
+
+
 def oee_context(
     state: AppState,
     form: OeeQuery,
     rules: OeeRules,
     shift: Shift,
     figures: ShiftFigures,
+    listed: list[ListedStops],
     now: float,
 ) -> OeeContext:
     """The page of a shift up to now."""
@@ -250,7 +293,7 @@ def oee_context(
             (say(SHIFT_WORDS[back]), span_text(shift_at(now, starts, back)), name, name == form.shift)
             for back, name in enumerate(SHIFTS)
         ],
-        robots={str(robot.id): robot.name for robot in panel.robots},
+        robots=panel.robot_names,
         span=span_text(shift),
         index=_figure("index", figures.oee, _good(figures), rules.target),
         parts=list(_parts(figures, rules)),
@@ -266,8 +309,8 @@ def oee_context(
         summed=word("sum", minutes=down, count=count) if figures.stops else "",
         reasons=list(_reasons(figures.reasons, rules)),
         table=word("open" if form.open else "longest"),
-        has_open=bool(figures.open),
-        listed=[_shown(stop, rules) for stop in (figures.open if form.open else figures.longest)],
+        has_open=bool(figures.open) or len(panel.robots) > 1,
+        listed=listed,
         lacks=list(_lacks(figures)),
         alarm_word=alarm_word,
         word=word,

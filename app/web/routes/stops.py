@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_args
@@ -165,9 +165,11 @@ class ShownRecording(NamedTuple):
 
 
 class StoryContext(TypedDict):
-    """The variables of `stop.html`, beside those of the frame."""
+    """The variables of `stop.html`, beside those of the frame. `of_robot` is the name of the robot that
+    stopped, "" for the only one."""
 
     story: Story
+    of_robot: TextLike
     at: Text
     lasted: TextLike
     lines: list[ShownLine]
@@ -208,10 +210,9 @@ async def stops(
     now = time.time()
     newest = await _reader(state).stops(now - DAYS_S, now + 1.0, query.robot or None)
     page = FramedPage("stops.html", word("list"), "/stops", "alarms")
-    robots = {str(robot.id): robot.name for robot in state.fleet.panel.robots}
     context = {
-        "days": list(_by_day(newest)), "robots": robots, "word": word, "alarm_word": alarm_word,
-        "log_word": log_word,
+        "days": list(_by_day(newest)), "robots": state.fleet.panel.robot_names, "word": word,
+        "alarm_word": alarm_word, "log_word": log_word,
     }  # fmt: skip
     return framed_page(request, state, page, context)
 
@@ -244,7 +245,7 @@ async def of_alarm(state: CurrentState, query: Annotated[AlarmQuery, Query()]) -
 
 @router.get(
     "/stops/asked",
-    summary="To the story of the stop whose reason is asked, or else to the list",
+    summary="To the story of the stop whose reason is asked, or to the list of several",
     responses=errors(403, 422, 429, 503),
     status_code=303,
     response_class=RedirectResponse,
@@ -252,21 +253,23 @@ async def of_alarm(state: CurrentState, query: Annotated[AlarmQuery, Query()]) -
 async def asked(state: CurrentState) -> Response:
     question = state.fleet.alarms.asked
     key = ""
-    if question is not None and len(question["began"]) > 1:
+    if question is not None and len(question["stops"]) > 1:
         return RedirectResponse(f"{state.root}{_list_of(state, question)}", status_code=303)
     if question is not None:
-        key = await _reader(state).key_at(question["robot"], question["began"][0])
+        stop = question["stops"][0]
+        key = await _reader(state).key_at(stop["robot"], stop["began"])
     path = f"/stops/{key}#reasons" if key else "/stops"
     return RedirectResponse(f"{state.root}{path}", status_code=303)
 
 
 def _list_of(state: AppState, question: AskedReason) -> str:
-    """The page with the stops of a shift that have no reason."""
-    now, starts = time.time(), state.fleet.panel.alarm_rules.shifts
-    until = question["began"][-1]
-    shift = next((name for n, name in enumerate(SHIFTS) if shift_at(now, starts, n).since <= until), "")
-    robot = f"&robot={quote(question['robot'])}" if question["robot"] else ""
-    return f"/oee?shift={shift or SHIFTS[-1]}{robot}&open=1"
+    """The page with the stops of a shift that have no reason, and the figures of the robot that had the
+    newest one."""
+    now, starts, ends = time.time(), state.fleet.panel.alarm_rules.shifts, question["shift_ends"]
+    shift = next((name for n, name in enumerate(SHIFTS) if shift_at(now, starts, n).since < ends), "")
+    path = f"/oee?shift={shift or SHIFTS[-1]}"
+    newest = question["stops"][-1]["robot"]
+    return f"{path}&robot={quote(newest)}&open=1#stops" if newest else f"{path}&open=1"
 
 
 @router.post(
@@ -312,7 +315,8 @@ async def story_page(
     page = FramedPage("stop.html", word("title"), f"/stops/{key}", "alarms")
     language = caller_of(request).language
     asked = await _asked(state, reader, story.stop, query.act)
-    context = story_context(story, end, names, bool(query.all), language, asked)
+    robots = state.fleet.panel.robot_names
+    context = story_context(story, end, names, robots, bool(query.all), language, asked)
     robot = state.fleet.of_robot(story.stop.robot).robot
     context["curves"] = story_curves(story, names, robot, time.monotonic(), time.time())
     context["parcel"] = caller_of(request).principal.meets(MAINTENANCE)
@@ -473,18 +477,20 @@ def story_context(
     story: Story,
     end: float | None,
     names: PanelNames,
+    robots: Mapping[str, TextLike],
     is_whole: bool,
     language: str,
     asked: AskedStop | None = None,
 ) -> StoryContext:
     """The variables of a story, for its page and for paper; `end` is when the stop was over, None while
-    it is not known to be."""
+    it is not known to be. `robots` are the names of the panel's robots by their ids."""
     short = story.short()
     lines = story.lines if is_whole else short
     count, every = number(str(len(short))), number(f"{len(story.lines):,d}")
     duration = duration_text(float(round(end - story.stop.at))) if end is not None else ""
     return StoryContext(
         story=story,
+        of_robot=robots.get(story.stop.robot, "") if len(robots) > 1 else "",
         at=format_datetime(story.stop.at),
         lasted=word("stopped_for", duration=duration) if duration else "",
         lines=[_shown(line, story) for line in lines],

@@ -13,6 +13,7 @@ import pytest
 from app.cell.alarms.report import CountRow, StatePeriod, StateRow, read_counts, write_states
 from app.cell.stops.changes import Change
 from app.cell.stops.oee import (
+    MOST_OPEN,
     NOT_ANSWERED,
     SHORT,
     Answer,
@@ -25,6 +26,7 @@ from app.cell.stops.oee import (
     answered,
     break_spans,
     counted,
+    open_stops,
     quantities,
     shift_figures,
     spells,
@@ -253,6 +255,26 @@ def test_the_bands_show_what_is_planned_and_what_is_not_recorded() -> None:
         ("unknown", 700, 800),
         ("running", 800, 1000),
     ]
+
+
+def test_the_open_stops_of_all_robots_are_listed_by_their_begin() -> None:
+    left = figures([(0, 100, WAIT), (100, 500, RUN), (500, 600, WAIT), (600, 1000, RUN)])
+    right = figures(
+        [(0, 200, RUN), (200, 300, WAIT), (300, 700, RUN), (700, 730, WAIT), (730, 900, RUN)]
+    )
+    stops = open_stops({"left": left, "right": right})
+    begun = [(stop.robot, stop.time.stop.standstill.since) for stop in stops]
+    assert begun == [("left", 0), ("right", 200), ("left", 500)]
+
+
+def test_of_many_open_stops_the_newest_of_all_robots_are_listed() -> None:
+    plan = PLAN._replace(reason_after_s=1.0)
+    often = figures([(at, at + 20, (RUN, WAIT)[at // 20 % 2]) for at in range(0, 1000, 20)], plan=plan)
+    late = figures([(800, 890, WAIT), (890, 1000, RUN)])
+    stops = open_stops({"late": late, "often": often})
+    assert len(stops) == MOST_OPEN
+    assert [stop.robot for stop in stops].count("late") == 1
+    assert stops[-1].time.stop.standstill.since == 940
 
 
 def test_a_stop_goes_on_over_a_time_without_a_record() -> None:
