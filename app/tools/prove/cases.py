@@ -8,7 +8,7 @@ from typing import Final, Literal, NamedTuple
 
 from app.panel.alarm import Alarm
 from app.panel.condition import Condition, Interlock
-from app.panel.model import Panel
+from app.panel.model import Panel, RobotEntry
 from app.panel.roles import MAINTENANCE, ROLES, VIEWER
 from app.panel.widgets.families import Command
 from app.panel.widgets.hold import HoldCommand
@@ -251,3 +251,8 @@ def names_interlock(reasons: str, interlock: Interlock) -> bool:
             text.partition("{value}")[0] for text in each_language(interlock.own_sentence).values()
         ]
     return any(text and text in reasons for text in (*said, interlock.topic))
+
+
+def names_robot(reasons: str, robot: RobotEntry) -> bool:
+    """Whether a reason that the page shows is about this robot."""
+    return any(name in reasons for name in each_language(robot.name).values())

@@ -13,7 +13,7 @@ from app.panel.model import Panel
 from app.records.entry import GOOD_OUTCOMES
 from app.system.printable import readable
 from app.system.texts import render
-from app.tools.prove.cases import alarm_key, names_interlock
+from app.tools.prove.cases import alarm_key, names_interlock, names_robot
 from app.tools.prove.steps import Row
 from app.tools.prove.watch import Entry, PanelWatch
 
@@ -37,6 +37,7 @@ class Measure:
     _locked_from: float = inf  # seconds since 1970 of the server's clock
     _locked_until: float = inf
     _is_armed: bool = False  # it was seen as it is before the situation
+    _reasons_before: str = ""  # while the link was up
     _entry: str = ""  # of an alarm
     _passed: list[str] = field(default_factory=list)
 
@@ -121,18 +122,28 @@ class Measure:
             self._say("free")
         else:
             self._say(f"locked: {reasons}")
-            return self.row.situation == "robot_lost" or names_interlock(reasons, interlock)
+            return self._is_about(reasons, interlock)
         return False
 
+    def _is_about(self, reasons: str, interlock: Interlock) -> bool:
+        """Whether a reason names the interlock, or the robot that is lost. What is said to a client
+        without control names the interlock only."""
+        if self.row.situation != "robot_lost" or self.watch.shown.control.get("required"):
+            return names_interlock(reasons, interlock)
+        robot = next(each for each in self.panel.robots if each.id == interlock.robot)
+        return names_robot(reasons, robot)
+
     def _cut(self) -> bool:
+        """The control is locked, with another reason than before where it was locked already."""
         shown, name = self.watch.shown, self.row.name
+        reasons = shown.reasons(name)
         if shown.link.get("bridge", {}).get("state") == "ok":
-            self._is_armed = True
+            self._is_armed, self._reasons_before = True, reasons
             self._say("the link is up")
             return False
         if self._is_armed:
-            self._say(f"locked: {shown.reasons(name)}" if shown.is_locked(name) else "free")
-        return self._is_armed and shown.is_locked(name)
+            self._say(f"locked: {reasons}" if shown.is_locked(name) else "free")
+        return self._is_armed and shown.is_locked(name) and reasons != self._reasons_before
 
     def _locked_for(self, client: PanelWatch | None) -> bool:
         """The control is locked, or not shown, for a client without the right."""

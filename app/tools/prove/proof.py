@@ -21,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from app.cell.alarms.published import entry_name
+from app.cell.commands.holds import RELEASED
 from app.cell.recipes.book import FOLDER, RecipeFolder
 from app.cell.recipes.recipe import checked_values, new_recipe
 from app.panel.alarm import Alarm
@@ -69,8 +70,10 @@ BROWSER_WITHIN_S: Final = 5.0  # on a busy machine a page is drawn late
 ENDED_WITHIN_S: Final = 12.0  # a goal of the simulated robot
 BEATS_S: Final = 0.08
 HELD_S: Final = 0.3
-TRIES: Final = 3  # to begin a hold that must begin
-REFUSED: Final = "the server refuses the hold"
+TRIES: Final = 3  # of a press that must be done
+REFUSED: Final = "the server refuses it"
+ENDED: Final = "the server ended the hold"
+AGAIN: Final = (REFUSED, ENDED)  # begin faults after which an operator presses again
 RECIPE: Final = "proof"  # the id of the recipe that is loaded, of each set
 OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
 
@@ -287,7 +290,7 @@ class _Round:
                     self._works(guarded, interlock.id)
 
     def _await_free(self, name: str) -> None:
-        self._rig.shown.wait(lambda: not self._rig.shown.is_locked(name), SHOWN_WITHIN_S)
+        self._rig.await_free(name, SHOWN_WITHIN_S)
 
     def _permit_others(self, guarded: Guarded, interlock: Interlock) -> None:
         """Interlocks of this control on the field of another round have a value that permits it."""
@@ -394,12 +397,17 @@ class _Round:
 
     def _arrives(self, guarded: Guarded) -> str:
         """That what a press sends arrives at the robot; "" if so."""
-        if isinstance(guarded.control, HoldCommand):
-            return self._holds(guarded)
+        is_hold = isinstance(guarded.control, HoldCommand)
+        send = self._held_for_a_moment if is_hold else self._pressed
+        return self._tried(guarded, lambda: (send(guarded), None))[0]
+
+    def _pressed(self, guarded: Guarded) -> str:
         before = self._arrived(guarded)
         answer = self._press(guarded)
         if self._code == "switch_reported_already":
             answer = self._press(guarded, is_on=False)
+        if answer == "refused":
+            return f"{REFUSED}: {self._said}"
         arrived = self._within(lambda: self._arrived(guarded) != before, SHOWN_WITHIN_S)
         shown, name = self._rig.shown, str(guarded.control.id)
         shown.wait(lambda: not shown.widgets.get(name, {}).get("busy"), ENDED_WITHIN_S)
@@ -528,40 +536,44 @@ class _Round:
     def _tried(
         self, guarded: Guarded, attempt: Callable[[], tuple[str, float | None]]
     ) -> tuple[str, float | None]:
-        """What is refused because the state has just changed is begun again, as by an operator."""
+        """Begins again, as an operator does, what is refused because the state has just changed, and a
+        hold that ends because this machine had no time for its beats."""
         for _ in range(TRIES - 1):
             fault, took_s = attempt()
-            if not fault.startswith(REFUSED):
+            if not fault.startswith(AGAIN):
                 return fault, took_s
-            self._await_free(str(guarded.control.id))
+            name = str(guarded.control.id)
+            self._rig.await_free(name, SHOWN_WITHIN_S, refused=fault.startswith(REFUSED))
         return attempt()
 
-    def _holds(self, guarded: Guarded) -> str:
-        """That a hold is sent while it is held; "" if so."""
-        return self._tried(guarded, lambda: (self._held_for_a_moment(guarded), None))[0]
-
     def _held_for_a_moment(self, guarded: Guarded) -> str:
+        """That a hold is sent while it is held; "" if so."""
         topic = str(getattr(guarded.control, "topic", ""))
         before = self._robot.arrived[topic]
         with self._socket(guarded) as socket:
             try:
                 if not is_held(held := self._begin(socket, guarded)):
                     return f"{REFUSED}: {held.get('reason')}"
-                self._beat(socket, held, HELD_S)
+                if ended := self._beat(socket, held, HELD_S):
+                    return ended
             except ConnectionClosed as closed:
-                return f"the server ended the hold: {closed}"
+                return f"{ENDED}: {closed}"
         return "" if self._robot.arrived[topic] > before else "nothing arrived at the robot"
 
-    def _beat(self, socket: ClientConnection, held: dict[str, Any], for_s: float) -> None:
+    def _beat(self, socket: ClientConnection, held: dict[str, Any], for_s: float) -> str:
         """Holds for some time; `held` has the stamp of the last answer, and the number of the last
-        beat."""
+        beat. Why the server has ended it; "" if it has not."""
         end = time.monotonic() + for_s
         while time.monotonic() < end:
             held["number"] = number = held.get("number", 0) + 1
             beat = {"do": "beat", "number": number, "lease": held["lease"], "stamp": held["stamp"]}
             socket.send(json.dumps({**beat, "after": 1}))
-            held["stamp"] = json.loads(socket.recv(5)).get("stamp", held["stamp"])
+            answer = json.loads(socket.recv(5))
+            if not is_held(answer):
+                return f"{ENDED}: {answer.get('reason')}"
+            held["stamp"] = answer["stamp"]
             time.sleep(BEATS_S)
+        return ""
 
     def _hold(self, guarded: Guarded, end: HoldEnd, interlock: Interlock | None) -> None:
         """A hold that ends in a way: how long until the last message has left."""
@@ -572,7 +584,7 @@ class _Round:
                 with self._socket(guarded) as socket:
                     return self._held_until(socket, guarded, end, interlock)
             except (ConnectionClosed, TimeoutError) as closed:
-                return f"the hold ended by itself: {closed}", None
+                return f"{ENDED}: {closed}", None
 
         fault, took_s = self._tried(guarded, attempt)
         self._report(name, guard, end, fault, took_s, kind="hold")
@@ -583,17 +595,23 @@ class _Round:
         """Holds for a moment, brings about the end, and looks whether it stops."""
         if not is_held(held := self._begin(socket, guarded)):
             return f"{REFUSED}: {held.get('reason')}", None
-        self._beat(socket, held, HELD_S)
+        if ended := self._beat(socket, held, HELD_S):
+            return ended, None
         began = time.monotonic()
         if end == "released":
             done = {"do": "end", "why": "released", "lease": held["lease"]}
             socket.send(json.dumps({**done, "stamp": held["stamp"], "after": 1}))
+            if (answer := json.loads(socket.recv(5))).get("code") != RELEASED:
+                return f"{ENDED}: {answer.get('reason')}", None
         elif end == "page_gone":
             socket.close()
         elif interlock is not None:
             self._robots.forbid(interlock, guarded.guards)
+            stays_until = began + 2 * STOPPED_WITHIN_S
             with suppress(ConnectionClosed):  # the finger stays on it
-                self._beat(socket, held, 2 * STOPPED_WITHIN_S)
+                while time.monotonic() < stays_until:
+                    self._beat(socket, held, stays_until - time.monotonic())
+                    time.sleep(BEATS_S)
         return self._stopped(str(getattr(guarded.control, "topic", "")), began)
 
     def _stopped(self, topic: str, began: float) -> tuple[str, float | None]:
@@ -628,7 +646,7 @@ class _Round:
         if not alarms:
             return
         raised = [(alarm, *self._raised(alarm, LOST_WITHIN_S)) for alarm in alarms]
-        self._rig.join_again()
+        self._rig.join_again(self._robots.name)
         for alarm, fault, took_s in raised:
             fault = fault or self._returned(alarm, JOINED_WITHIN_S)
             self._report(str(alarm.id), "", "raised", fault, took_s, kind="alarm")

@@ -56,6 +56,7 @@ log = logging.getLogger("kiosk.prove")
 STARTED_WITHIN_S: Final = 30.0
 ANSWER_WITHIN_S: Final = 10.0
 POLL_S: Final = 0.01
+SETTLED_WITHIN_S: Final = 0.5  # from a refusal until the page shows its reason
 REQUESTED: Final = ("alarms", "session")  # first segments of paths, beside what pages use
 LOADING: Final = threading.Lock()  # Pydantic builds the schema of a model in one thread at a time
 KEPT_EVERY_S: Final = 1.0
@@ -99,6 +100,11 @@ class Rig:
     # Start and end.
 
     def __enter__(self) -> "Rig":
+        self._start_server()
+        self._start_client()
+        return self
+
+    def _start_server(self) -> None:
         if self.users:
             self._add_users()
         serving = threading.Thread(target=self._serve, name="prove-server", daemon=True)
@@ -111,6 +117,8 @@ class Rig:
             if time.monotonic() > end:
                 raise KioskError("the panel did not start in time")
             time.sleep(POLL_S)
+
+    def _start_client(self) -> None:
         self.cookie = self._client = self._held = self._new_cookie()
         if self.users:
             self._sign_in(HOLDER)
@@ -122,7 +130,6 @@ class Rig:
         reading = threading.Thread(target=self._read_events, name="prove-events", daemon=True)
         self._threads.append(reading)
         reading.start()
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._ends.set()
@@ -202,11 +209,10 @@ class Rig:
         """The link to a robot, by its id, is cut."""
         self._simulating[robot].close()
 
-    def join_again(self) -> None:
-        """The proved robot is back at its endpoint."""
-        name = self.robots.name
-        make = self._made[name]
-        self._simulators[name] = self._simulating[name].enter_context(make())
+    def join_again(self, robot: str = "") -> None:
+        """A robot, by its id, is back at its endpoint."""
+        make = self._made[robot]
+        self._simulators[robot] = self._simulating[robot].enter_context(make())
 
     def announce_node(self, node: str, *, gone: bool) -> None:
         """A node of the proved robot is there, or gone."""
@@ -233,6 +239,17 @@ class Rig:
         done.wait(ANSWER_WITHIN_S)
 
     # What a client does.
+
+    def await_free(self, control: str, within_s: float, *, refused: bool = False) -> bool:
+        """Whether the page shows a control as free in time. After a press that was `refused` it waits
+        first for the lock, which the page may not have shown yet."""
+        shown = self.shown
+        if refused:
+            shown.wait(lambda: shown.is_locked(control), SETTLED_WITHIN_S)
+        return (
+            shown.wait(lambda: control in shown.widgets and not shown.is_locked(control), within_s)
+            is not None
+        )
 
     def press(
         self, control: str, inputs: Mapping[str, Any], confirmation: str = ""

@@ -22,6 +22,7 @@ AGAIN_S: Final = 1.0
 LOG_EVERY_S: Final = 1.0  # others export it too, one at a time
 BUSY: Final = 429
 FIRST_WITHIN_S: Final = 15.0
+MET: Final = re.compile(r'<li data-met="met">.*?</li>', re.DOTALL)  # an interlock that permits
 TAG: Final = re.compile(r"<[^>]*>")
 SPACES: Final = re.compile(r"\s+")
 Entry = Mapping[str, str]  # a row of the log as CSV, by its columns
@@ -91,7 +92,7 @@ class PanelWatch:
             text = self._client.text(f"{self._root}/widgets/{control}/lock", SILENT_AFTER_S)
         except KioskRefused:
             return ""
-        return SPACES.sub(" ", html.unescape(TAG.sub(" ", text))).strip()
+        return SPACES.sub(" ", html.unescape(TAG.sub(" ", MET.sub("", text)))).strip()
 
     def _follow_events(self) -> None:
         while not self._ends.is_set():

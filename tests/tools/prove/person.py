@@ -31,6 +31,7 @@ class Person:
         )  # fmt: skip
         os.close(slave)
         self.said = ""
+        self.robot = ""  # of the step that began last
         self._read = 0
 
     def hears(self, *texts: str) -> str:
@@ -62,7 +63,9 @@ class Person:
         """The title of the step that begins, "" if there is none any more."""
         if self.hears("\nStep ", " cases: ", '{\n  "panel"') != "\nStep ":
             return ""
+        start = self._read
         self.hears(": ")
+        self.robot = self.said[start : self._read - 2].partition(", robot ")[2]
         start = self._read
         self.hears("\n")
         title = self.said[start : self._read].strip()

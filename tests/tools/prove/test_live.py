@@ -4,20 +4,27 @@ import json
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack
+from copy import copy
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from app.panel import Panel, load_panel
-from app.tools.prove.cases import plan_of
+from app.panel.robot_panels import panel_of
+from app.tools.editor.kiosk_client import KioskClient
+from app.tools.prove.cases import alarm_key, plan_of
+from app.tools.prove.measures import Measure
 from app.tools.prove.proof import _Round
 from app.tools.prove.report import canonical
 from app.tools.prove.rig import Rig
 from app.tools.prove.robot import ProvingRobots
-from app.tools.prove.steps import steps_of
+from app.tools.prove.shown import Event, Shown
+from app.tools.prove.steps import Row, steps_of
+from app.tools.prove.watch import PanelWatch
 from tests.support.holds import TRIES
 from tests.tools.prove.person import Person
-from tests.tools.prove.test_prove import PANEL
+from tests.tools.prove.test_prove import PANEL, ROBOTS
 
 HORN = """
 title = "Cell"
@@ -60,48 +67,77 @@ def sit(people: ExitStack, panel: Path, rig: Rig, *options: str, by: str = "M. S
     return person
 
 
+@dataclass
+class Beside(Rig):
+    """Another client of the server of a rig, with a robot of it."""
+
+    host: Rig | None = None
+
+    def _start_server(self) -> None:
+        assert self.host is not None
+        self.port, self._simulators = self.host.port, self.host._simulators
+        self._simulating, self._made = self.host._simulating, self.host._made
+
+
+def press(rig: Rig, control: str) -> None:
+    """As an operator, who presses again where the state has just changed: between the end of a
+    publisher and the token of the next its last value counts."""
+    is_free, tries = rig.await_free(control, 20), TRIES
+    while (outcome := rig.press(control, {})[1]["outcome"]) == "refused" and tries:
+        is_free, tries = rig.await_free(control, 20, refused=True), tries - 1
+    assert (is_free, outcome) == (True, "published")
+
+
 class Operator:
     """Does at the machine what a step asks for."""
 
-    def __init__(self, panel: Panel, folder: Path) -> None:
-        self.plan = plan_of(panel)
-        self.steps = {step.title: step for step in steps_of(panel, self.plan, has_users=False)}
-        self.at = _Round(panel, "", self.plan, folder=folder, tell=lambda _: None, looks=False)
-        self.rig, self.robot = self.at._rig, self.at._robot
+    def __init__(
+        self, panel: Panel, folder: Path, robot: str = "", beside: "Operator | None" = None
+    ) -> None:
+        """`robot` is the id of one of several, whose server is that of the operator `beside` this."""
+        own = panel_of(panel, robot or None)
+        self.plan = plan_of(own, robot)
+        self.steps = {step.title: step for step in steps_of(own, self.plan, has_users=False)}
+        self.at = _Round(panel, robot, self.plan, folder=folder, tell=lambda _: None, looks=False)
+        if beside is not None:
+            robots = copy(beside.robots)
+            robots.name, robots.own = robot, robots[robot]
+            self.at._robots, self.at._robot = robots, robots.own
+            self.at._rig = Beside(panel, robots, folder, host=beside.rig)
+        self.rig: Rig = self.at._rig
+        self.robots: ProvingRobots = self.at._robots
+        self.lost = ""
 
     def does(self, title: str, person: Person) -> None:
         kind, *names = self.steps[title].key.split("/")
         interlocks = [*self.plan.interlocks.values()]
-        self.robot.permit(interlocks, {*self.plan.interlocks})
+        self.restores()
+        self.robots.permit(interlocks, {*self.plan.interlocks})
         for each in interlocks:  # the step before may have announced it otherwise
             self.rig.announce(each)
         if kind == "interlock":
             self._changes(names[0], names[1], person)
         elif kind == "press":
-            assert self.presses(names[0]) == "published"
+            press(self.rig, names[0])
         elif kind == "hold":
-            self.free(names[0])
+            assert self.rig.await_free(names[0], 20)
             guard = self.plan.interlocks.get(names[2])
             self.at._hold(self.plan.controls[names[0]], names[1], guard)  # type: ignore[arg-type]
         elif kind == "alarm":
             self._raises(names[0])
-        else:
+        elif names[0] == "link_cut":
             person.hears("the link is up")
-            self.rig.cut()
+            self.cuts(self.robots.name)
 
-    def presses(self, control: str) -> str:
-        """The outcome; again where the state has just changed: between the end of a publisher and the
-        token of the next its last value counts."""
-        outcome = ""
-        for _ in range(TRIES):
-            self.free(control)
-            outcome = self.rig.press(control, {})[1]["outcome"]
-            if outcome != "refused":
-                break
-        return outcome
+    def cuts(self, robot: str) -> None:
+        self.lost = robot or "the only one"
+        self.rig.cut(robot)
 
-    def free(self, control: str) -> None:
-        assert self.rig.shown.wait(lambda: not self.rig.shown.is_locked(control), 20) is not None
+    def restores(self) -> None:
+        """What was cut is there again."""
+        if self.lost:
+            self.rig.join_again(self.lost if self.robots.name else "")
+            self.lost = ""
 
     def _changes(self, guard: str, situation: str, person: Person) -> None:
         interlock = self.plan.interlocks[guard]
@@ -109,21 +145,22 @@ class Operator:
             return
         person.hears(f'"{interlock.label}" permits')
         if situation == "forbids":
-            self.robot.forbid(interlock, {*self.plan.interlocks})
+            self.robots.forbid(interlock, {*self.plan.interlocks})
         elif situation == "old":
-            self.robot.silence([interlock.topic])
+            self.robots.silence([interlock])
+        elif situation == "robot_lost":
+            self.cuts(self.robots.name_for(interlock))
         else:
             gone = situation == "publisher_gone"
             self.rig.announce(interlock, "std_msgs/msg/Int8", gone=gone)
 
     def _raises(self, name: str) -> None:
         alarm = next(each for each in self.plan.alarms if each.id == name)
-        self.robot.set_alarm(alarm, raised=True)
-        shown = self.rig.shown
-        assert shown.wait(lambda: shown.alarm(name).get("state") == "active", 20) is not None
-        body = {"occurrence": shown.alarm(name)["occurrence"]}
-        assert self.rig.request("POST", f"/alarms/{name}/acknowledge", body)[0] == 200
-        self.robot.set_alarm(alarm, raised=False)
+        self.robots.own.set_alarm(alarm, raised=True)
+        shown, key = self.rig.shown, alarm_key(name, self.robots.name)
+        assert shown.wait(lambda: shown.alarm(key).get("state") == "active", 20) is not None
+        assert self.rig.acknowledge(key, shown.alarm(key)["occurrence"])[0] == 200
+        self.robots.own.set_alarm(alarm, raised=False)
 
 
 def test_a_person_goes_through_all_steps(tmp_path: Path, people: ExitStack) -> None:
@@ -163,9 +200,81 @@ def test_a_person_goes_through_all_steps(tmp_path: Path, people: ExitStack) -> N
     assert b"M. Sato" in canonical(report)
 
 
+def test_each_of_two_robots_is_proved_where_control_is_required(
+    tmp_path: Path, people: ExitStack
+) -> None:
+    """The watcher has no control: to it each control is locked all the time."""
+    path = tmp_path / "cell.toml"
+    path.write_text(ROBOTS)
+    panel = load_panel(path)
+    left = Operator(panel, tmp_path / "machine", "left")
+    right = Operator(panel, tmp_path / "beside", "right", left)
+    with left.rig, right.rig:
+        person = sit(people, path, left.rig, "--json")
+        seen = []
+        while title := person.step():
+            operator = {"left": left, "right": right}[person.robot]
+            seen.append((person.robot, title))
+            step = operator.steps[title]
+            if step.key.endswith("never_seen"):
+                person.types("snot on a Monday\n")
+                continue
+            left.restores()
+            operator.does(title, person)
+            person.sees([row.name for row in step.rows])
+            person.ticks()
+        assert person.ends() == 0, person.said
+    assert seen == [("left", title) for title in left.steps] + [
+        ("right", title) for title in right.steps
+    ]
+    report = json.loads(person.said[person.said.index("{\n") :])
+    rows = {
+        (row["robot"], row["name"], row["guard"], row["situation"]): row for row in report["results"]
+    }
+    forbids = rows["right", "weld", "door", "forbids"]["shown"]
+    assert "Door not met" in forbids
+    assert "Left is out of the way" not in forbids  # it permits
+    lost = rows["right", "weld", "left_clear", "robot_lost"]["shown"]
+    assert "Left is out of the way not known" in lost
+    assert "No connection" in rows["right", "weld", "", "link_cut"]["shown"]
+
+
+def measured(panel: Panel, situation: str, guard: str) -> tuple[Measure, Shown]:
+    """Of the control weld, and what its server shows: everything permits."""
+    watch = PanelWatch(KioskClient("http://127.0.0.1", None), "right")
+    watch.lost = ""
+    watch.shown.take(Event("link", {"bridge": {"state": "ok"}}, ""))
+    watch.shown.take(Event(f"{guard}-enabled-updated", {"enabled": True}, ""))
+    measure = Measure(Row("control", "weld", guard, situation), panel, watch)
+    measure.look()
+    return measure, watch.shown
+
+
+def locks(shown: Shown, measure: Measure, reasons: str) -> bool:
+    """Whether a lock with this reason is what the step waits for."""
+    shown.take(Event("update", {"weld": {"enabled": False, "reasons": reasons}}, ""))
+    measure.look()
+    return measure.took_s is not None
+
+
+def test_a_lost_robot_and_a_cut_link_are_shown_by_reasons_that_say_so(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(ROBOTS.replace('"Left"', '"Welder"').replace("control = {", "# control = {"))
+    panel = load_panel(path)
+    lost, shown = measured(panel, "robot_lost", "left_clear")
+    shown.take(Event("left_clear-enabled-updated", {"enabled": False}, ""))
+    assert not locks(shown, lost, "The robot does not permit Left is out of the way.")
+    assert locks(shown, lost, "Welder: No connection to the robot.")
+    cut, shown = measured(panel, "link_cut", "")
+    assert not locks(shown, cut, "The robot does not permit Door.")
+    shown.take(Event("link", {"bridge": {"state": "lost"}}, ""))
+    assert not locks(shown, cut, "The robot does not permit Door.")
+    assert locks(shown, cut, "No connection to the robot.")
+
+
 def finish(person: Person, rig: Rig) -> int:
     """The steps of the panel with a horn, from the press on."""
-    assert rig.press("horn", {})[1]["outcome"] == "published"
+    press(rig, "horn")
     person.sees(["horn"])
     person.ticks()
     person.step()
@@ -180,7 +289,7 @@ def finish(person: Person, rig: Rig) -> int:
 def test_it_is_interrupted_three_times_and_goes_on(horn: Path, rig: Rig, people: ExitStack) -> None:
     first = sit(people, horn, rig)
     first.step()
-    assert rig.press("horn", {})[1]["outcome"] == "published"
+    press(rig, "horn")
     first.sees(["horn"])
     first.types("rsaw it move\n")
     first.ticks()
@@ -219,7 +328,7 @@ def test_a_step_before_is_answered_again_and_a_cross_does_not_hold(
     person.step()
     person.types("b")
     person.step()
-    assert rig.press("horn", {})[1]["outcome"] == "published"
+    press(rig, "horn")
     person.sees(["horn"])
     person.types("xnobody heard it\n")
     person.hears("kept: cross, with 1 faults")

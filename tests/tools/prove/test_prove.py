@@ -18,7 +18,7 @@ from app.panel import Panel, load_panel
 from app.tools.cli.prove import main
 from app.tools.prove import proof as proving
 from app.tools.prove.cases import plan_of
-from app.tools.prove.proof import prove
+from app.tools.prove.proof import AGAIN, ENDED, _Round, prove
 from app.tools.prove.result import Proof
 from app.tools.prove.rig import HOLDER, Rig
 from app.tools.prove.robot import ProvingRobots
@@ -112,6 +112,39 @@ def test_what_the_page_says_names_the_interlock_and_times_are_measured(whole: Pr
 
 def always(value: Any) -> Any:
     return lambda *_, **__: value
+
+
+@pytest.mark.parametrize(("where", "name", "control", "at_first"), [
+    ("_rig", "press", "horn", (409, {"outcome": "refused", "reason": "Just changed."})),
+    ("", "_begin", "jog", {"state": "ended", "outcome": "refused", "reason": "Just changed."}),
+    ("", "_beat", "jog", f"{ENDED}: no signal from the browser."),
+])  # fmt: skip
+def test_a_press_that_is_refused_at_first_or_a_hold_that_ends_by_itself_is_tried_again(
+    panel: Panel,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    where: str,
+    name: str,
+    control: str,
+    at_first: Any,
+) -> None:
+    plan = plan_of(panel)
+    proving = _Round(panel, "", plan, folder=tmp_path, tell=lambda _: None, looks=False)
+    owner = getattr(proving, where) if where else proving
+    does, times = getattr(owner, name), 0
+
+    def changed(*arguments: Any) -> Any:
+        nonlocal times
+        times += 1
+        return at_first if times in (1, 3, 4, 5) else does(*arguments)
+
+    guarded = plan.controls[control]
+    monkeypatch.setattr(owner, name, changed)
+    with proving._rig:
+        proving._permit_for(guarded, [*plan.interlocks.values()])
+        assert proving._arrives(guarded) == ""
+        assert proving._arrives(guarded).startswith(AGAIN)  # it is refused each time
+    assert times == 5
 
 
 # Code that decides wrongly: (module or class, name, in its place).
