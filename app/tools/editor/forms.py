@@ -754,7 +754,7 @@ class _Maker:
                 text = plain(group.get("title"), self.language) or f"{number + 1}"
                 choices.append(Choice(at, text, above == at))
             yield Field(
-                path,
+                (*path, "group"),
                 table_name("group"),
                 "choice",
                 raw=above,
@@ -994,7 +994,7 @@ class _Maker:
         name = title.replace(" ", "-")
         if name not in self.suggestions and self.interfaces is not None:
             self.suggestions[name] = tuple(
-                (each, "") for each in sorted(_types(self.interfaces, title))
+                (each, "") for each in sorted(types_of(self.interfaces, title))
             )
         return name if name in self.suggestions else ""
 
@@ -1524,10 +1524,11 @@ def _parts_of(title: str) -> tuple[str, ...]:
         "service type": ("/srv/",),
         "action type": ("/action/",),
         "message or service type": ("/msg/", "/srv/"),
-    }[title]
+    }.get(title, ())
 
 
-def _types(interfaces: Interfaces, title: str) -> Iterator[str]:
+def types_of(interfaces: Interfaces, title: str) -> Iterator[str]:
+    """The types that a key with this format can have, by its title in the schema; none for others."""
     for name in interfaces.structures:
         for part in _parts_of(title):
             if part == "/msg/" and part in name:

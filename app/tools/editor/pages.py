@@ -245,7 +245,7 @@ def _form(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     form = form_of(
         tables,
         path,
-        interfaces=_interfaces(editor),
+        interfaces=interfaces_of(editor),
         robot=_robot_names(editor, at(tables, path)),
         faults=editor.checked.faults,
         language=request.language,
@@ -292,7 +292,7 @@ def _robot_names(editor: Editor, table: Any) -> RobotNames:
     )
 
 
-def _interfaces(editor: Editor) -> Interfaces | None:
+def interfaces_of(editor: Editor) -> Interfaces | None:
     """The message types of the panel; None if its folders have faults."""
     panel = editor.preview.panel
     try:

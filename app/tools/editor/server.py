@@ -26,8 +26,9 @@ from app.tools.editor.adding import Addition, add
 from app.tools.editor.checked import DocumentChecker
 from app.tools.editor.document import Change, EditError, edit_from, path_from
 from app.tools.editor.editor import Browser, Editor, PartRequest
+from app.tools.editor.filling import filled
 from app.tools.editor.merge import Side
-from app.tools.editor.pages import PARTS, page_context, place_list
+from app.tools.editor.pages import PARTS, interfaces_of, page_context, place_list
 from app.tools.editor.pasting import paste
 from app.tools.editor.paths import path_of
 from app.tools.editor.preview import ROOT as PREVIEW
@@ -306,7 +307,8 @@ def _add_routes(app: FastAPI, settings: Settings, sign_in: SignIn | None) -> Non
 
     @app.post("/edits")
     async def edit(posted: Edits, request: Request, editor: CurrentEditor) -> Response:
-        edits = [*map(edit_from, posted.edits)]
+        typed = map(edit_from, posted.edits)
+        edits = filled(typed, editor.document.tables, interfaces_of(editor))
         author = person_of(request)
         return _step(
             request, editor, lambda: editor.apply(edits, posted.label, posted.revision, author)

@@ -17,6 +17,8 @@ import { updateInPlace } from "../in-place.js";
 const NUMBER = /^[-+]?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?$/;
 const TOML = /^\s*(true|false|["'[].*|\{[^=]*=.*|\{\s*\})\s*$/s; // "{speed}" is a text
 const STEPPED_MS = 400; // after the last arrow key, before its number is posted
+const ROW = ".field, .rows";
+const CONTROLS = "input:not([type=file]), select, textarea, button:not(:disabled)";
 const COMPACT = 6; // decimals of a number that arrow keys made
 
 /** @typedef {HTMLInputElement | HTMLTextAreaElement | HTMLSelectElement} Entry */
@@ -26,6 +28,9 @@ const json = (element, name) => JSON.parse(element.getAttribute(`data-${name}`) 
 
 /** @param {EventTarget | null} target @param {string} selector @returns {HTMLElement | null} */
 const near = (target, selector) => (target instanceof Element ? target.closest(selector) : null);
+
+/** @param {HTMLElement} row */
+const nameOf = (row) => row.id || row.dataset.row;
 
 /** @param {EventTarget | null} target @returns {target is Entry} */
 function isEntry(target) {
@@ -208,6 +213,7 @@ export class Form {
         details.toggleAttribute("open", there.open);
     }
     const focused = this.#pane.contains(document.activeElement) ? document.activeElement : null;
+    const rows = focused ? this.#rowsFrom(focused) : [];
     const kept = { skips: (/** @type {Element} */ node) => isEntry(node) && this.#isTyped(node), stays: isRefusal };
     updateInPlace(this.#pane, fresh, kept);
     for (const entry of this.#entries()) if (!this.#isTyped(entry)) reset(entry);
@@ -216,18 +222,37 @@ export class Form {
       if (!group || !this.#ticking.has(group)) box.checked = box.defaultChecked;
     }
     for (const entry of this.#refused) if (!entry.isConnected) this.#refused.delete(entry);
-    if (focused && document.activeElement === document.body) this.#focusAgain(focused);
+    if (focused && document.activeElement === document.body) this.#focusAgain(focused, rows);
     return undefined;
   }
 
-  // A field that has another place keeps the focus, and what is being typed; without it the first has the focus.
-  /** @param {Element} before */
-  #focusAgain(before) {
-    const same = before.isConnected ? before : document.getElementById(before.id);
-    const found = same ?? this.#pane.querySelector(".form :is(input, select, button)");
+  // The names of the row that an element is in, and of those after it.
+  /** @param {Element} element @returns {(string | undefined)[]} */
+  #rowsFrom(element) {
+    const rows = /** @type {HTMLElement[]} */ ([...this.#pane.querySelectorAll(ROW)]);
+    const first = rows.findLastIndex((row) => row.contains(element));
+    return first < 0 ? [] : rows.slice(first).map(nameOf);
+  }
+
+  // A field that has another place keeps the focus, and what is being typed. Where it is gone or folded, what its row
+  // has now, or the next one, has the focus; without these the first.
+  /** @param {Element} before @param {(string | undefined)[]} rows */
+  #focusAgain(before, rows) {
+    const there = before.isConnected ? before : document.getElementById(before.id);
+    const same = there?.checkVisibility() ? there : null; // not folded
+    const found = same ?? this.#firstOf(rows) ?? this.#pane.querySelector(`.form :is(${CONTROLS})`);
     if (same !== before && isEntry(same) && isEntry(before) && before.value !== known(before))
       same.value = before.value;
     if (found instanceof HTMLElement) found.focus({ preventScroll: same === found });
+  }
+
+  // The first control of the first of these rows that is there.
+  /** @param {(string | undefined)[]} rows */
+  #firstOf(rows) {
+    const there = new Map();
+    for (const row of /** @type {NodeListOf<HTMLElement>} */ (this.#pane.querySelectorAll(ROW)))
+      there.set(nameOf(row), row.checkVisibility() ? row.querySelector(CONTROLS) : null);
+    return rows.map((name) => there.get(name)).find(Boolean);
   }
 
   /** @returns {Entry[]} */

@@ -8,6 +8,7 @@ from typing import Final
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.tools.editor.forms import element_id
 from tests.browser.editor.form_page import FormBrowser
 from tests.browser.test_accessibility import violations
 from tests.support.parts import TESTS, until
@@ -301,6 +302,29 @@ def test_a_topic_brings_its_type(show: Show) -> None:
     topic.press("Enter")
     until(lambda: form.saved["page"][0]["widget"][0]["type"] == "std_msgs/msg/UInt8", "with its type")
     assert len(form.labels) == 1
+
+
+@pytest.mark.parametrize("key", ["Tab", "Enter"])
+def test_after_a_field_that_goes_the_focus_is_in_the_next(show: Show, key: str) -> None:
+    text = TEXT.replace('type = "geometry_msgs/msg/Twist"\n', "").replace(
+        "message = { linear = { x = 0.5 } }\n", ""
+    )
+    form = show(*GO, text=text)
+    form.field(*GO, "type").fill("geometry_msgs/msg/Twist")
+    form.field(*GO, "type").press(key)
+    until(lambda: "type" in form.saved["page"][0]["widget"][1], "the type is set")
+    expect(form.field(*GO, "type")).to_be_hidden()  # it stands beside the topic now
+    expect(form.page.locator(f"[id='{element_id((*GO, 'message'))}'] select")).to_be_focused()
+
+
+def test_a_widgets_group_stays_over_an_edit(show: Show) -> None:
+    form = show(*BOXES)
+    group = form.page.get_by_label("Group", exact=True)
+    expect(group).to_be_visible()
+    form.field(*BOXES, "target").fill("150")
+    form.field(*BOXES, "target").press("Enter")
+    until(lambda: form.saved["page"][0]["widget"][0]["target"] == 150, "a key is set")
+    expect(group).to_be_visible()
 
 
 def test_tables_are_opened_from_lists_and_added(show: Show) -> None:

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -84,6 +85,21 @@ def test_an_edit_is_a_step_with_a_new_revision(editor: EditorServer) -> None:
     assert editor.http.post("/redo", json={}).status_code == 200
     assert not editor.state()["saved"]
     assert editor.http.post("/redo", json={}).status_code == 422
+
+
+def test_a_typed_type_is_made_whole_and_filled_in_as_one_step(editor: EditorServer) -> None:
+    added = {"op": "insert", "path": ["page", 1, "widget", 0]}
+    lamp = {"id": "door", "kind": "indicator", "label": "Door", "topic": "/door_closed"}
+    editor.edit({**added, "value": lamp}).raise_for_status()
+    assert editor.state()["faults"] > 0
+    at = [*added["path"], "type"]
+    editor.edit({"op": "set", "path": at, "value": "Bool"}).raise_for_status()
+    assert editor.state()["faults"] == 0
+    door = tomllib.loads(editor.http.get("/text").text)["page"][1]["widget"][0]
+    assert door["type"] == "std_msgs/msg/Bool"
+    assert [state["value"] for state in door["states"]] == [True, False]
+    editor.http.post("/undo", json={}).raise_for_status()
+    assert tomllib.loads(editor.http.get("/text").text)["page"][1]["widget"][0] == lamp
 
 
 def test_an_edit_of_an_older_revision_follows_its_table(editor: EditorServer) -> None:
