@@ -254,7 +254,9 @@ def test_open_reasons_of_all_robots_are_asked_together(tmp_path: Path) -> None:
             assert f"<b>{name}</b>" in server.http.get(f"/stops/{of_robot[0]}").text
             assert give(server, of_robot[0], "material")["outcome"] == "succeeded"
         rest = listed(server)
-        assert not {keys[name][0] for name in keys} & {key for of in rest.values() for key in of}
+        assert not {keys[name][0] for name in keys} & {
+            key for answers in rest.values() for key in answers
+        }
         until(lambda: robots() == {"left", "right"}, "both are asked about their next stops")
 
 
