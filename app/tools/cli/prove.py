@@ -5,6 +5,7 @@ Exit status: 0 every case holds, 1 some do not, 2 the panel can't be used, 3 a l
 """
 
 import json
+import math
 import os
 import sys
 from argparse import Namespace
@@ -49,6 +50,7 @@ def _prove(options: Namespace) -> int:
 
 
 def _simulated(options: Namespace, subject: "Subject") -> "Proof":
+    from app.tools.prove.cases import MOST_WAITED_S
     from app.tools.prove.proof import prove
 
     shows = sys.stderr.isatty()
@@ -57,7 +59,8 @@ def _simulated(options: Namespace, subject: "Subject") -> "Proof":
         if shows:
             print("✗" if result.fault else "·", end="", file=sys.stderr, flush=True)
 
-    proof = prove(subject.panel, show, with_browser=not options.no_browser)
+    longest_s = math.inf if options.patient else MOST_WAITED_S
+    proof = prove(subject.panel, show, with_browser=not options.no_browser, longest_s=longest_s)
     if shows:
         print(file=sys.stderr)
     return proof
@@ -129,6 +132,11 @@ def make_parser(prog: str) -> Parser:
         help="sign the report with the key of the operator's log in the data folder",
     )
     add("--no-browser", action="store_true", help="do not look at the pages in Chromium")
+    add(
+        "--patient",
+        action="store_true",
+        help="also try alarms that take longer than 30 s, one after another, as long as they take",
+    )
     add("--live", default="", metavar="URL", help="the running panel of a real robot")
     add("--by", default="", metavar="NAME", help="who watches a live proof; else it is asked")
     add(

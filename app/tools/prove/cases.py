@@ -26,7 +26,7 @@ OF_INTERLOCK: Final[Sequence[Situation]] = (
 )  # fmt: skip
 # Those in which a confirmation by a person is wrong; the last one where it takes two.
 WRONGLY_CONFIRMED: Final[Sequence[Situation]] = ("unconfirmed", "wrong_pin", "same_person")
-MOST_WAITED_S: Final = 30.0  # for an alarm
+MOST_WAITED_S: Final = 30.0  # for an alarm, unless the proof is patient
 ENTRY: Final = "1"  # the code of an alarm that is an entry of a list: also a number
 HoldEnd = Literal["released", "page_gone", "no_beat", "forbids", "link_cut"]
 HOLD_ENDS: Final[Sequence[HoldEnd]] = ("released", "page_gone", "no_beat", "forbids")
@@ -156,9 +156,9 @@ def wrong_confirmations(confirmation: Confirmation) -> Sequence[Situation]:
     return WRONGLY_CONFIRMED if confirmation == "two_persons" else WRONGLY_CONFIRMED[:-1]
 
 
-def plan_of(panel: Panel, robot: str = "") -> Plan:
+def plan_of(panel: Panel, robot: str = "", longest_s: float = MOST_WAITED_S) -> Plan:
     """The plan for the robot without a name, or for the `robot` (its id) whose panel this is
-    (`panel_of`)."""
+    (`panel_of`). Alarms that take longer than `longest_s` are left out."""
     interlocks = {each.id: each for each in panel.every_interlock}
     left_out: dict[str, str] = {}
     controls: dict[str, Guarded] = {}
@@ -168,10 +168,8 @@ def plan_of(panel: Panel, robot: str = "") -> Plan:
         controls[str(widget.id)] = Guarded(widget, guards, needs)
     used = {guard for guarded in controls.values() for guard in guarded.guards}
     alarms = []
-    for alarm in panel.alarms:
-        if not alarm.is_for(robot or None):
-            continue
-        if why := why_not_provable(alarm, panel):
+    for alarm in alarms_of(panel, robot):
+        if why := why_not_provable(alarm, panel, longest_s):
             left_out[f"alarm {alarm.id}"] = why
         else:
             alarms.append(alarm)
@@ -184,11 +182,16 @@ def alarm_key(name: str, robot: str) -> str:
     return f"{name}@{robot}" if robot else name
 
 
-def why_not_provable(alarm: Alarm, panel: Panel) -> str:
+def alarms_of(panel: Panel, robot: str) -> Sequence[Alarm]:
+    """The alarms of the only robot (""), or of one of several."""
+    return [alarm for alarm in panel.alarms if alarm.is_for(robot or None)]
+
+
+def why_not_provable(alarm: Alarm, panel: Panel, longest_s: float) -> str:
     """Why an alarm can't be raised on the simulated robot; "" if it can."""
     waits_s = alarm.on_delay_s + alarm.off_delay_s + (alarm.stale_s or 0.0)
-    if waits_s > MOST_WAITED_S:
-        return f"it takes {waits_s:g} s, and the proof waits for {MOST_WAITED_S:g} s at most"
+    if waits_s > longest_s:
+        return f"it takes {waits_s:g} s, and the proof waits for {longest_s:g} s at most (--patient)"
     judged = {interlock.topic for interlock in panel.every_interlock}
     if alarm.suppressed_while is not None and alarm.suppressed_while.topic in judged:
         return "what suppresses it is an interlock's topic too"

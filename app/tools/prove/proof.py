@@ -42,6 +42,7 @@ from app.records.entry import GOOD_OUTCOMES
 from app.system.texts import render
 from app.tools.prove.browser import PageView, Seen, has_browser
 from app.tools.prove.cases import (
+    MOST_WAITED_S,
     Guarded,
     HoldEnd,
     Persona,
@@ -83,10 +84,15 @@ def is_held(answer: Mapping[str, Any]) -> bool:
 
 
 def prove(
-    panel: Panel, on_result: Callable[[Result], None] = lambda _: None, *, with_browser: bool = True
+    panel: Panel,
+    on_result: Callable[[Result], None] = lambda _: None,
+    *,
+    with_browser: bool = True,
+    longest_s: float = MOST_WAITED_S,
 ) -> Proof:
     """The proof of a panel, for each of its robots; `with_browser`: its pages are looked at in Chromium
-    too, if there is one. KioskError if the panel can't be served."""
+    too, if there is one. Alarms that take longer than `longest_s` are left out. KioskError if the panel
+    can't be served."""
     began, proof = time.monotonic(), Proof()
     proof.browser = has_browser() if with_browser else ""
     lock = threading.Lock()
@@ -117,7 +123,7 @@ def prove(
     ):
         rounds: list[Future[None]] = []
         for robot in [str(entry.id) for entry in panel.robots] or [""]:
-            plan = plan_of(panel_of(panel, robot or None), robot)
+            plan = plan_of(panel_of(panel, robot or None), robot, longest_s)
             named = f"{robot}: " if robot else ""
             proof.left_out |= {f"{named}{name}": why for name, why in plan.left_out.items()}
             place = Path(folder) / (robot or "only")

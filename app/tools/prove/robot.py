@@ -16,7 +16,7 @@ from app.panel.widgets.parameter import GET
 from app.panel.widgets.publish import Step
 from app.ros.messages import Interfaces, load_interfaces
 from app.ros.messages.definitions import FLOAT_TYPES
-from app.tools.prove.cases import ENTRY, Field, entry_of, judged_fields
+from app.tools.prove.cases import ENTRY, Field, alarms_of, entry_of, judged_fields
 from app.tools.simulator.known_types import Moment, plausible
 from app.tools.simulator.machine import candidates, satisfies
 from app.tools.simulator.panel_robot import PanelRobot
@@ -58,7 +58,7 @@ class ProvingRobot:
         self._judged: dict[Field, Judged] = {}
         for key, conditions in judged_fields(self.panel, self.name).items():
             self._judged[key] = self._judge(key, types[key[0]], conditions)
-        alarms = [alarm for alarm in self.panel.alarms if alarm.is_for(self.name or None)]
+        alarms = alarms_of(self.panel, self.name)
         for alarm in alarms:
             self._add_alarm(alarm, types)
         # The services by which the nodes of alarms are known to be there.

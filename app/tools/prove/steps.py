@@ -11,7 +11,7 @@ from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.templated import is_stop
 from app.ros.messages.validation import format_value
 from app.system.texts import render
-from app.tools.prove.cases import HOLD_ENDS, Guarded, Plan, Situation, situations
+from app.tools.prove.cases import HOLD_ENDS, Guarded, Plan, Situation, alarms_of, situations
 
 OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
 AT_THE_END: Final = "the server's last moments are too short to watch: proved on the simulated robot"
@@ -61,7 +61,7 @@ def steps_of(panel: Panel, plan: Plan, *, has_users: bool) -> Iterator[Step]:
             yield from _of_hold(guarded, plan)
         else:
             yield _of_press(guarded)
-    for alarm in plan.alarms:
+    for alarm in alarms_of(panel, plan.robot):
         acknowledged = "" if alarm.ack == "none" else " Acknowledge it at the panel."
         yield Step(
             f"alarm/{alarm.id}",

@@ -22,6 +22,7 @@ from app.tools.prove.proof import AGAIN, ENDED, _Round, prove
 from app.tools.prove.result import Proof
 from app.tools.prove.rig import HOLDER, Rig
 from app.tools.prove.robot import ProvingRobots
+from app.tools.prove.steps import steps_of
 
 PANEL = """
 title = "Cell"
@@ -358,18 +359,66 @@ on_delay_s = 600.0
 """
 
 
+PATIENT = """
+title = "Cell"
+[[page]]
+id = "main"
+title = "Main"
+[[alarm]]
+id = "late"
+text = "Late"
+topic = "/beat"
+type = "std_msgs/msg/Bool"
+stale_s = 1.5
+on_delay_s = 0.7
+off_delay_s = 0.8
+"""
+
+
 def test_recipes_are_loaded_and_alarms_of_each_source_are_raised(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(ALARMS)
     proof = proved(load_panel(path))
     assert [tuple(result) for result in proof.faults] == []
-    assert proof.left_out == {"alarm slow": "it takes 600 s, and the proof waits for 30 s at most"}
+    why = "it takes 600 s, and the proof waits for 30 s at most (--patient)"
+    assert proof.left_out == {"alarm slow": why}
     tried = {(row.name, row.guard, row.situation) for row in proof.results}
     assert {
         ("boxes", "ready", situation) for situation in ("permits", "forbids", "never_seen")
     } <= tried
     raised = {row.name for row in proof.results if row.kind == "alarm"}
     assert raised == {"silent", "gone", "cut", "motors", "listed", "calm"}
+
+
+def test_a_patient_proof_waits_for_an_alarm_as_long_as_it_takes(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(PATIENT)
+    panel = load_panel(path)
+    plan = plan_of(panel, longest_s=2.9)
+    assert [*plan.left_out] == ["alarm late"]
+    live = [step.key for step in steps_of(panel, plan, has_users=False)]
+    assert live == ["alarm/late"]  # a person waits for it
+    proof = prove(panel, with_browser=False, longest_s=3.0)
+    assert [(row.name, row.fault) for row in proof.results] == [("late", "")]
+    assert proof.results[0].took_s is not None
+    assert 2.0 < proof.results[0].took_s < 4.9
+
+
+@pytest.mark.parametrize(("options", "longest_s"), [((), 30.0), (("--patient",), math.inf)])
+def test_the_command_is_patient_if_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], longest_s: float
+) -> None:
+    waits: list[float] = []
+
+    def kept(*_: Any, **named: Any) -> Proof:
+        waits.append(named["longest_s"])
+        return Proof()
+
+    monkeypatch.setattr(proving, "prove", kept)
+    path = tmp_path / "cell.toml"
+    path.write_text(PATIENT)
+    main([str(path), *options])
+    assert waits == [longest_s]
 
 
 @pytest.mark.long("table")
