@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Depends, Path
@@ -10,7 +11,7 @@ from starlette.requests import HTTPConnection
 from app.cell.commands.acts import ActContext, ActRunner
 from app.cell.commands.judge import PressLimits
 from app.cell.commands.receipts import Receipt
-from app.cell.commands.user_acts import USER_ACTS
+from app.cell.commands.user_acts import USER_ACTS, end_lock
 from app.cell.people.access import Access
 from app.cell.people.confirmer import Confirmer
 from app.cell.session.doctor_process import DoctorProcess
@@ -80,7 +81,9 @@ class AppState:
     def __post_init__(self) -> None:
         guard, nothing_shown = self.fleet.first.press_guard, lambda: None
         context = ActContext(guard, PressLog(self.log), "", nothing_shown)
-        self.user_acts = ActRunner("access", USER_ACTS, self.access, context)
+        self.user_acts = ActRunner(
+            "access", USER_ACTS, self.access, context, further_lock=partial(end_lock, self.access)
+        )
         self.confirmer = Confirmer(self.access)
 
     @property

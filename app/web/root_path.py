@@ -25,6 +25,7 @@ OWN_PATHS: Final = frozenset(
             "help",
             "recipes",
             "session",
+            "sessions",
             "signin",
             "users",
         ),

@@ -44,6 +44,8 @@ ROUTE_NEEDS: Final[Mapping[str, str]] = {
     "/readyz": ANYBODY,
     # Who signs in and out.
     "/session": ANYBODY,
+    "/sessions": ANYBODY,  # one's own
+    "/sessions/end": ANYBODY,  # judged where it is made
     "/session/end": ANYBODY,
     "/session/here": ANYBODY,
     "/session/oidc": ANYBODY,

@@ -23,7 +23,9 @@ from app.web.route_needs import ROBOT
 FIRST: Final = ("pages", "events", "static", "health")
 # Those of a wall: no path of it reaches a robot.
 FIRST_OF_WALL: Final = ("wall", "events", "static", "health")
-LATE_OF_WALL: Final = frozenset({"help", "session", "signin", "users", "log", "log.csv", "display"})
+LATE_OF_WALL: Final = frozenset(
+    {"help", "session", "sessions", "signin", "users", "log", "log.csv", "display"}
+)
 # The others, by the first segment of their paths.
 LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "widgets": (
@@ -41,6 +43,7 @@ LATE: Final[Mapping[str, tuple[str, ...]]] = {
     "recordings": ("recordings",),
     "help": ("help",),
     "session": ("sign_in",),
+    "sessions": ("users",),
     "signin": ("sign_in",),
     "users": ("users",),
     "log": ("audit_log",),

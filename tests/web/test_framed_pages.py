@@ -55,6 +55,7 @@ PAGES: Final = {
     "/log": ("/log", 200),
     "/places/{widget}": ("/places/goal", 200),
     "/recipes/{set}": ("/recipes/boxes", 200),
+    "/sessions": ("/sessions", 200),
     "/signin": ("/signin", 200),
     "/stops": ("/stops", 200),
     "/oee": ("/oee", 404),

@@ -55,6 +55,18 @@ def test_a_pin_is_taken_at_the_panel_itself_and_a_password_elsewhere_too(
     assert here.post("/session", json={"user": "M. Sato", "pin": "2580"}).status_code == 200
 
 
+def test_elsewhere_too_the_page_of_sign_in_leads_to_the_own_sign_ins(
+    browsers: Browsers, kiosk: Server
+) -> None:
+    here, client = browsers.opened(kiosk.url), far(browsers, kiosk)
+    for browser, secret in ((here, {"pin": "2580"}), (client, {"password": PASSWORD})):
+        assert 'href="/sessions"' not in browser.get("/signin").text
+        browser.post("/session", json={"user": "M. Sato", **secret}).raise_for_status()
+        assert browser.get("/signin").text.count('href="/sessions"') == 1
+    addresses = [row["address"] for row in client.get("/sessions").json()["sessions"]]
+    assert addresses[-2:] == ["127.0.0.1", "192.0.2.7"]
+
+
 def test_at_the_panel_one_who_errs_delays_nobody_else(browsers: Browsers, tmp_path: Path) -> None:
     add_user(tmp_path, "M. Sato", "operator", pin="2580")
     add_user(tmp_path, "J. Brandt", "engineer", pin="1470", badge="04A2B3")

@@ -27,7 +27,9 @@ from app.cell.people.edits import (
 )
 from app.cell.people.secrets_hash import WAYS, Cost, Way, fault_of, token_hash
 from app.cell.people.users import UserBook, UsersError
-from app.panel.roles import ENGINEER
+from app.cell.permission.roles import role_verdict
+from app.cell.permission.verdict import Verdict
+from app.panel.roles import ANYBODY, ENGINEER
 from app.records.press_record import origin_of
 from app.system.errors import os_error_text
 from app.system.texts import Text, TextLike, say
@@ -150,6 +152,14 @@ def _end_session(access: Access, request: ActRequest) -> Applied:
     return Applied(note=say("users_done_end", name=session.user, where=session.client.address))
 
 
+def end_lock(access: Access, request: ActRequest) -> Verdict | None:
+    """Why a client may not end a sign-in, None if it may: everyone ends their own, an engineer all."""
+    session = access.sessions.of_handle(request.object) if request.act == END else None
+    if session is None or session in access.own_sessions(request.who):
+        return None
+    return role_verdict({ENGINEER}, request.who)
+
+
 def _row(plan: Plan, detail: Callable[[ActRequest], str], code: str) -> Act[Access, Applied]:
     # A change that was made has its entry by the file, which also has those of the command line.
     # The word of such an act is that of its change, in `app/cell/people/access_log.py`.
@@ -198,6 +208,7 @@ USER_ACTS: Final[Mapping[str, Act[Access, Applied]]] = {
     "revoke": _row(
         lambda book, p: revoke_token(book, p.name), lambda _: "revoked", "users_done_revoke"
     ),
-    # No change of the users' file: its entry is the act's own, beside that of the sign-out.
-    END: Act("", server_permits, _end_session, lambda applied: applied.note, ENGINEER),
+    # No change of the users' file: its entry is the act's own, beside that of the sign-out. Whose
+    # sign-in it may be says `end_lock`.
+    END: Act("", server_permits, _end_session, lambda applied: applied.note, ANYBODY),
 }

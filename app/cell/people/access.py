@@ -504,6 +504,16 @@ class Access:
         for session, reason in self.sessions.end_due():
             self._ended(session, reason)
 
+    def own_sessions(self, who: Principal) -> list[Session]:
+        """The sessions of the user who is signed in, the longest untouched first; none of a program's
+        owner. A name that the plant's provider gave is another user's than the same in the users'
+        file."""
+        current = self.sessions.of_client(who.client.id) if who.user and not who.program else None
+        if current is None:
+            return []
+        own = (current.user, bool(current.role))
+        return [each for each in self.sessions if (each.user, bool(each.role)) == own]
+
     def end(self, session: Session, by: Principal) -> None:
         """Signs a user out from afar."""
         self.sessions.end(session)

@@ -22,6 +22,7 @@ WORDS: Final = {
     "who": "signin_who",
     "sign_in": "signin_sign_in",
     "sign_out": "signin_sign_out",
+    "own": "users_page_own",
     "other": "signin_other",
     "pin": "signin_pin",
     "password": "signin_password",

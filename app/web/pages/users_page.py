@@ -1,8 +1,9 @@
-"""The page of users: the list of users or of tokens, one of them, and the forms that change it."""
+"""The page of users: the list of users, tokens or sign-ins, one of them, and the forms that change it;
+the page of one's own sign-ins is the same."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, Final, Literal, TypedDict
 
@@ -18,7 +19,7 @@ from app.system.texts import Param, Text, TextLike, joined, number, say
 from app.web.pages.sign_in import ROLE_WORDS
 
 Mode = Literal["show", "add", "role", "pin", "password", "badge", "remove", "token", "revoke", "end"]
-Listed = Literal["users", "tokens", "sessions"]
+Listed = Literal["users", "tokens", "sessions", "own"]
 GROUP: Final = "group-"  # stands before the id of a group in a form
 OF_LISTS: Final[Mapping[str, Listed]] = {"token": "tokens", "revoke": "tokens", "end": "sessions"}
 
@@ -30,13 +31,14 @@ class UserRow:
     name: str
     about: TextLike
     mark: TextLike = ""
-    title: str = ""
+    title: TextLike = ""
 
 
 @dataclass(frozen=True, slots=True)
 class SelectedAccount:
     """The user, token or sign-in that is shown: its facts as (name, text); `version` is the number of
-    its last change. `title` is its name for people, "" where that is `name`."""
+    its last change. `title` is its name for people, "" where that is `name`. `here`: it is the sign-in
+    at this browser."""
 
     name: str
     role: str
@@ -45,7 +47,8 @@ class SelectedAccount:
     disabled: bool
     facts: list[tuple[Text, TextLike]]
     version: int
-    title: str = ""
+    title: TextLike = ""
+    here: bool = False
 
 
 class UsersContext(TypedDict):
@@ -87,7 +90,7 @@ def users_context(
     rows = rows_of(access, who)
     names = [row.name for row in rows]
     shown = name if name in names else next(iter(names), "") if not name else ""
-    chosen = details(access, shown) if shown else None
+    chosen = details(access, shown, who) if shown else None
     if not access.configured and mode == "show":
         mode = "add"
     needs_one = mode not in ("show", "add", "token")
@@ -134,11 +137,27 @@ def _session_rows(access: Access, who: Principal) -> list[UserRow]:
     """The newest touch first."""
     rows = []
     for session in reversed([*access.sessions]):
-        is_own = session.client.id == who.client.id
-        rows.append(
-            UserRow(session.handle, _where(session), word("you") if is_own else "", session.user)
-        )
+        mark = word("you") if _is_here(session, who) else ""
+        rows.append(UserRow(session.handle, _where(session), mark, session.user))
     return rows
+
+
+def _own_rows(access: Access, who: Principal) -> list[UserRow]:
+    """Those of the user who is signed in, the newest touch first."""
+    rows = []
+    for session in reversed(access.own_sessions(who)):
+        mark = word("here") if _is_here(session, who) else ""
+        rows.append(UserRow(session.handle, _since(access, session), mark, session.client.title))
+    return rows
+
+
+def _is_here(session: Session, who: Principal) -> bool:
+    return session.client.id == who.client.id
+
+
+def _since(access: Access, session: Session) -> Text:
+    began_s, _ = access.sessions.seen_s(session)
+    return format_datetime(time.time() - began_s)
 
 
 def _where(session: Session) -> TextLike:
@@ -146,20 +165,25 @@ def _where(session: Session) -> TextLike:
     return client.name if client.local else joined((client.name, client.address), "between_names")
 
 
-def _session(access: Access, handle: str) -> SelectedAccount | None:
+def _session(access: Access, handle: str, who: Principal) -> SelectedAccount | None:
     session = access.sessions.of_handle(handle)
     if session is None:
         return None
-    began_s, touched_s = access.sessions.seen_s(session)
+    _, touched_s = access.sessions.seen_s(session)
     principal = access.principal(session.client, session.id)
     facts: list[tuple[Text, TextLike]] = [
         (word("role"), _role(principal.role, sorted(principal.groups))),
         (word("where"), _where(session)),
-        (word("since"), format_datetime(time.time() - began_s)),
+        (word("since"), _since(access, session)),
         (word("touched"), word("ago", age=format_age(touched_s))),
     ]
-    about = (principal.role, (), (), False, facts, 0, session.user)
+    about = (principal.role, (), (), False, facts, 0, session.user, _is_here(session, who))
     return SelectedAccount(handle, *about)
+
+
+def _own_session(access: Access, handle: str, who: Principal) -> SelectedAccount | None:
+    session, account = access.sessions.of_handle(handle), _session(access, handle, who)
+    return replace(account, title=session.client.title) if session and account else None
 
 
 def _token_rows(access: Access, _: Principal) -> list[UserRow]:
@@ -170,7 +194,7 @@ def _role(role: str, groups: Sequence[str]) -> TextLike:
     return joined((ROLE_WORDS[role], *groups), "between_names")
 
 
-def _user(access: Access, name: str) -> SelectedAccount | None:
+def _user(access: Access, name: str, _: Principal) -> SelectedAccount | None:
     user = access.book.user(name)
     if user is None:
         return None
@@ -187,7 +211,7 @@ def _user(access: Access, name: str) -> SelectedAccount | None:
     return SelectedAccount(*about, facts, version)
 
 
-def _token(access: Access, name: str) -> SelectedAccount | None:
+def _token(access: Access, name: str, _: Principal) -> SelectedAccount | None:
     token = next((token for token in access.book.tokens if token.name == name), None)
     if token is None:
         return None
@@ -212,9 +236,10 @@ def _time(text: str) -> TextLike:
 
 
 Rows = Callable[[Access, Principal], list[UserRow]]
-Details = Callable[[Access, str], SelectedAccount | None]
+Details = Callable[[Access, str, Principal], SelectedAccount | None]
 LISTS: Final[Mapping[Listed, tuple[Rows, Details]]] = {
     "users": (_user_rows, _user),
     "tokens": (_token_rows, _token),
     "sessions": (_session_rows, _session),
+    "own": (_own_rows, _own_session),
 }

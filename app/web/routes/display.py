@@ -14,7 +14,7 @@ router = APIRouter()
 
 OWN_PAGE: Final = re.compile(
     r"(/robots/[a-z0-9_]+)?/(pages|places|recipes)/[a-z0-9_]+|/log|/alarms(/history|/report)?"
-    r"|/stops(/(state|alarm|goal|link)-[0-9]+)?|/oee|/diagnostics|/help|/signin|/users"
+    r"|/stops(/(state|alarm|goal|link)-[0-9]+)?|/oee|/diagnostics|/help|/signin|/sessions|/users"
 )
 # What is none of these is ignored: a page that is still open may be of another version.
 BODY: Final = {

@@ -1,13 +1,14 @@
-"""The engineer's page of users, tokens and sign-ins, the same as JSON, and the acts on them."""
+"""The engineer's page of users, tokens and sign-ins, the same as JSON, and the acts on them; the page
+of the sign-ins of who is signed in."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any, Final
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Query, Request
-from fastapi.responses import Response
+from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.cell.commands.acts import ActReceipt
@@ -16,6 +17,7 @@ from app.cell.commands.user_acts import END, TOKEN, USER_ACTS
 from app.cell.people.access import Access
 from app.cell.people.edits import tokens_json, users_json
 from app.cell.people.secrets_hash import LONGEST, WAYS, new_api_token
+from app.cell.people.sessions import Session
 from app.cell.people.users import LONGEST_NAME
 from app.panel.roles import ROLES
 from app.system.clock import iso_time
@@ -49,6 +51,8 @@ ACT_FORM: Final = FormFields(
     },
     {f"^{GROUP}": {"enum": ["true"]}},
 )
+
+END_FORM: Final = FormFields({"name": NAME, "id": {"pattern": PRESS_ID}, "_since": SINCE})
 
 
 class UsersQuery(BaseModel):
@@ -110,7 +114,8 @@ class ListedToken(BaseModel):
 
 
 class ListedSession(BaseModel):
-    """A sign-in: `id` is what the act `end` takes as `name`. Times are ISO 8601."""
+    """A sign-in: `id` is what the act `end` takes as `name`. Times are ISO 8601. `here`: it is the one
+    at the browser that asks."""
 
     id: str
     user: str
@@ -119,6 +124,29 @@ class ListedSession(BaseModel):
     browser: str
     since: str
     touched: str
+    here: bool
+
+
+class SessionsAnswer(BaseModel):
+    """The sign-ins of the user who is signed in; none for a program."""
+
+    sessions: list[ListedSession]
+
+
+class SessionsQuery(BaseModel):
+    """`name` is the id of the sign-in that the page shows, `act` that of an act whose receipt is
+    shown."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: UserName = ""
+    act: Annotated[str, Field(max_length=400)] = ""
+
+
+class EndBody(ActBody):
+    """`name` is the id of a sign-in. The same `id` again is the same act."""
+
+    name: UserName = ""
 
 
 class UsersAnswer(BaseModel):
@@ -142,14 +170,17 @@ async def users(
     content = {
         "users": users_json(book, last),
         "tokens": tokens_json(book, last),
-        "sessions": _sessions_json(state.access),
+        "sessions": _sessions_json(request, state.access, [*state.access.sessions]),
     }
     return await rows_answer(request, lambda: content, len(book.users))
 
 
-def _sessions_json(access: Access) -> list[dict[str, str]]:
-    rows = []
-    for session in access.sessions:
+def _sessions_json(
+    request: Request, access: Access, sessions: Sequence[Session]
+) -> list[dict[str, str | bool]]:
+    own_client = caller_of(request).principal.client.id
+    rows: list[dict[str, str | bool]] = []
+    for session in sessions:
         began_s, touched_s = access.sessions.seen_s(session)
         client, now = session.client, time.time()
         rows.append(
@@ -161,9 +192,53 @@ def _sessions_json(access: Access) -> list[dict[str, str]]:
                 "browser": client.id,
                 "since": iso_time(now - began_s),
                 "touched": iso_time(now - touched_s),
+                "here": client.id == own_client,
             }
         )
     return rows
+
+
+@router.get(
+    "/sessions",
+    response_model=SessionsAnswer,
+    summary="The sign-ins of the user who is signed in: a page for browsers, else as JSON",
+    responses=errors(403, 422)
+    | {
+        200: {"content": PAGE},
+        303: {"description": "of a browser at which no one is signed in: to the page of sign-in"},
+    },
+)
+async def own_sessions(
+    request: Request, state: CurrentState, query: Annotated[SessionsQuery, Query()]
+) -> Response:
+    """Nobody sees those of others here."""
+    who = caller_of(request).principal
+    own = state.access.own_sessions(who)
+    if not caller_of(request).accepts_html:
+        content = {"sessions": _sessions_json(request, state.access, own)}
+        return JSONResponse(content, headers={"cache-control": "no-store"})
+    if not own:
+        return RedirectResponse(f"{state.root}/signin", 303)
+    said = said_of(query.act, [state.user_acts])
+    context = users_context(state.access, (), who, query.name, "own", "show", said)
+    page = FramedPage("users.html", word("own"), "/sessions")
+    return framed_page(request, state, page, {**context, "word": word})
+
+
+@router.post(
+    "/sessions/end",
+    response_model=ActAnswer,
+    summary="End a sign-in of one's own",
+    responses=act_responses(ActAnswer),
+    openapi_extra=described_body(EndBody, END_FORM.schema, required=False),
+)
+async def end_own(request: Request, state: CurrentState) -> Response:
+    """Of others only who may do it by `POST /users/end` too."""
+    sent = await sent_act(request, state, EndBody, END_FORM)
+    name = sent.body.name
+    receipt = await sent.run(state.user_acts, sent.asked(END, name), sent.act_id(END, name))
+    shown = "" if receipt.done else f"?{urlencode({'name': name})}"
+    return sent.answer(receipt, f"{state.root}/sessions{shown}")
 
 
 @router.post(

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.cell.people.access import Access, Attempt, SignInDelays
+from app.cell.people.oidc import ExternalUser
 from app.cell.people.secrets_hash import SMALL, Cost, badge_hash, hashed, token_hash
 from app.cell.people.sessions import MOST_OF_USER
 from app.cell.people.users import ApiToken, User, UserBook
@@ -130,6 +131,39 @@ def test_a_signed_in_user_has_name_role_and_groups(tmp_path: Path) -> None:
         assert access.principal(TABLET, session.id).role == VIEWER
 
     assert run(tmp_path, work, book()).codes == ["log_signed_in_password"]
+
+
+def test_own_sign_ins_are_those_of_the_same_user_and_of_no_namesake(tmp_path: Path) -> None:
+    """A program's token and a user of the plant's provider may have the name of a user."""
+    name = "oidc:M. Sato"
+    namesake = User(name, OPERATOR, pin=hashed("2580", QUICK))
+    users = replace(
+        book(),
+        users=(*book().users, namesake),
+        tokens=(ApiToken("M. Sato", OPERATOR, token_hash("opt_sato")),),
+    )
+    third, provided = (replace(CELL, id=f"cell{n}", number=n) for n in (3, 4))
+
+    async def work(access: Access, log: KeptLog) -> None:
+        def own(client: Client, session_id: str = "", bearer: str = "") -> list[str]:
+            sessions = access.own_sessions(access.principal(client, session_id, bearer))
+            return [session.client.id for session in sessions]
+
+        clients = (CELL, replace(CELL, id="cell2", number=2), third)
+        names = ("M. Sato", "M. Sato", name)
+        ids = []
+        for client, user in zip(clients, names, strict=True):
+            _, session = await access.sign_in(client, pin(user, "2580"))
+            assert session
+            ids.append(session.id)
+        external = access.sign_in_external(provided, ExternalUser(name, ENGINEER, frozenset(), ""))
+        assert own(CELL, ids[0]) == own(clients[1], ids[1]) == ["c0ffee", "cell2"]
+        assert own(third, ids[2]) == ["cell3"]
+        assert own(provided, external.id) == ["cell4"]
+        assert own(CELL) == own(TABLET) == own(TABLET, ids[0]) == []
+        assert own(PROGRAM, bearer="opt_sato") == own(CELL, ids[0], "opt_sato") == []
+
+    run(tmp_path, work, users)
 
 
 @pytest.mark.parametrize(
