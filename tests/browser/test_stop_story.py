@@ -36,10 +36,18 @@ def test_the_fault_parcel_is_downloaded(cell: Server, page: Page, tmp_path: Path
     download.value.save_as(file)
     with zipfile.ZipFile(file) as packed:
         assert packed.testzip() is None
-        assert {"README.txt", "story.html", "page.html"} <= set(packed.namelist())
-        (tmp_path / "story.html").write_bytes(packed.read("story.html"))
+        assert {"README.txt", "story.html", "pages/main.html"} <= set(packed.namelist())
+        packed.extractall(tmp_path)
     page.goto((tmp_path / "story.html").as_uri())
     expect(page.locator(".sentence")).to_contain_text("Fault")
+    requests: list[str] = []
+    page.on("request", lambda request: requests.append(request.url))
+    shown = (tmp_path / "pages/main.html").as_uri()
+    page.goto(shown)
+    expect(page.locator(".shown-at")).to_contain_text("when the machine stopped")
+    expect(page.locator('[data-kind="state"]')).to_contain_text("Fault")
+    page.locator('[data-widget="start"] button').first.click(force=True)
+    assert requests == [shown]
 
 
 @pytest.mark.parametrize("language", ["en", "de", "ja"])

@@ -602,8 +602,6 @@ class Recorder:
 
     def record_receipt(self, receipt: Receipt) -> None:
         """A press got its receipt, or a correction of it."""
-        if receipt.outcome == "aborted":
-            self.record_stop()
         who = self._pending_presses.pop(receipt.id, "")
         self._write_press(id=receipt.id, widget=receipt.widget, who=who, values=dict(receipt.inputs),
                    outcome=receipt.outcome, reason=render(receipt.reason), at=receipt.at)  # fmt: skip

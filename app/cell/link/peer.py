@@ -57,6 +57,8 @@ class RobotSignals:
         self.late_reading = Signal[[str, Reading]]()
         # Entries of tables that show the topic with this key were decoded.
         self.entries_decoded = Signal[[str]]()
+        # The machine has stopped: what happened has a story (`app/cell/session/stops.py`).
+        self.stopped = Signal[[]]()
         # Control changed without an act.
         self.handed_over = Signal[[HandOver]]()
         # The Zenoh session lost its link.

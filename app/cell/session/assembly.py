@@ -20,7 +20,7 @@ from app.panel.widgets.trend import trends_of
 from app.records import Limits, NullLog, OperatorLog
 from app.records.starts import KeptFiles, StartRecord, read_start_files
 from app.ros.zenoh.config import Config, config_from, config_to, tls_files
-from app.system.concurrency import end_tasks, keep_running
+from app.system.concurrency import end_tasks, keep_running, spawn_logged
 from app.system.settings import Mode, Settings
 from app.system.used_certificates import ServedCertificate, UsedCertificates
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("kiosk")
 
 MACHINE_AFTER_S: Final = 2.0
+STOPS_AFTER_S: Final = 1.0
 
 # (panel, which of its robots) → a simulated robot that runs while it is entered, by its endpoint.
 SimulatedRobot = Callable[[Panel, RobotEntry | None], AbstractContextManager[str]]
@@ -119,6 +120,7 @@ async def open_fleet(
         machine = keep_running(
             partial(_watch_machine, fleet, oplog, settings), log, "the machine is not watched"
         )
+        keeping = spawn_logged(_keep_stops(fleet, settings), log, "what is shown at stops is not kept")
         try:
             if recordings is not None:
                 recordings.start()
@@ -144,7 +146,7 @@ async def open_fleet(
             log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
             yield fleet
         finally:
-            await end_tasks([machine])
+            await end_tasks([machine, keeping])
             if fleet.forward is not None:
                 await fleet.forward.stop()
             if site is not None:
@@ -152,6 +154,8 @@ async def open_fleet(
             if states is not None:
                 await states.stop()
             await fleet.stop()
+            if fleet.stop_views is not None:
+                await fleet.stop_views.stop()
             if fleet.journal is not None:
                 await fleet.journal.stop()
             await fleet.alarms.stop()
@@ -191,6 +195,15 @@ async def _watch_machine(fleet: Fleet, oplog: OperatorLog | NullLog, settings: S
         reader = MachineReader(settings.panel.parent, data, keys, fleet.panel.log)
         fleet.machine = MachineWatch(oplog, fleet.skews, reader)
     await fleet.machine.run()
+
+
+async def _keep_stops(fleet: Fleet, settings: Settings) -> None:
+    """Is imported after the first page."""
+    await asyncio.sleep(STOPS_AFTER_S)
+    await asyncio.to_thread(import_module, "app.cell.session.stop_views")
+    from app.cell.session.stop_views import keep_stops
+
+    fleet.stop_views = keep_stops(fleet, settings.data_folder(mode_of(settings, fleet.panel)))
 
 
 def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":

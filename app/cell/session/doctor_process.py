@@ -8,18 +8,22 @@ Zenoh session to itself. So the page has what the commands have, by the same rul
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import BaseModel, Field, ValidationError
 
+from app.records.principal import Principal
 from app.system.concurrency import spawn_logged
 from app.system.errors import DoctorError, TooMany
 from app.system.settings import Settings
 from app.system.texts import TextLike, say
 from app.system.worker import Limits, RunningWorker, Worker, Workers
+
+if TYPE_CHECKING:
+    from app.cell.stops.story import Stop
 
 log = logging.getLogger("kiosk.doctor")
 
@@ -102,16 +106,17 @@ class DoctorProcess:
 
     @asynccontextmanager
     async def parcel(
-        self, at: float, key: str, robot: str, language: str
+        self, stop: "Stop", language: str, taker: Principal, now: Callable[[], Awaitable[bytes | None]]
     ) -> AsyncIterator[RunningWorker]:
-        """The fault parcel of a stop at a time (seconds since the epoch), in pieces of its zip;
-        DoctorError if it can't be made, TooMany while another one is."""
+        """The fault parcel of a stop, in pieces of its zip, with the pages that `taker` may see; `now`
+        returns what they show now, None if that is not known. DoctorError if it can't be made, TooMany
+        while another one is."""
         if self._parcel_lock.locked():
             raise TooMany(say("parcel_busy"), AGAIN_S)
         async with self._parcel_lock:
-            where = (self.settings, self.host, self.port)
+            about = (stop.at, stop.robot, stop.key), language, (taker.role, taker.groups)
             name = "app.tools.cli.parcel:pieces"
-            worker = Worker(name, *where, at, key, robot, language, limits=LIMITS)
+            worker = Worker(name, self.settings, *about, await now(), limits=LIMITS)
             async with self._parcels.run(worker) as running:
                 yield running
 

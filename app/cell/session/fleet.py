@@ -32,7 +32,7 @@ from app.cell.view.link_status import Lamp
 from app.cell.view.map_robots import RobotOnMap, has_only_moved, other_robots, robot_on_map
 from app.cell.view.overview import TileFigure, Tiles, figure_now, most_urgent
 from app.cell.view.publisher import ViewPublisher, difference
-from app.cell.view.view import NO_SHARED, SharedWidgets, ViewWithDeadlines
+from app.cell.view.view import NO_SHARED, SharedWidgets, View, ViewWithDeadlines
 from app.panel.condition import NamedCondition
 from app.panel.frame_keys import stops_of_several
 from app.panel.keys import SUMS
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from app.cell.session.machine_watch import MachineWatch
     from app.cell.session.maps import MapPictures
     from app.cell.session.place_file import SavedPlaceFile
+    from app.cell.session.stop_views import StopViews
     from app.cell.stops.changes import ChangeJournal
 
 log = logging.getLogger("kiosk.fleet")
@@ -195,6 +196,7 @@ class Fleet:
         self.states: Path | None = None  # the file of the machine's states
         self.forward: ForwardProcess | None = None  # to the plant's central database
         self.machine: MachineWatch | None = None  # of a server that reaches robots
+        self.stop_views: StopViews | None = None  # of such a server, from some time after its start
         server = ServerParts(
             panel,
             revision,
@@ -371,6 +373,16 @@ class Fleet:
             without[name] = {widget: locks[widget] for widget in ids if widget in locks}
         controls = {name: each.refresher.own.view["control"] for name, each in sessions.items()}
         return SharedWidgets(widgets, without, controls)
+
+    def whole_view(self, session: RobotSession) -> View:
+        """What the pages of `session` show at this moment, also those that no one looks at."""
+        view = session.refresher.whole_view()
+        for other in self.sharing(session):
+            own = other.refresher.whole_view()["widgets"]
+            name = other.robot.id
+            ids = [widget for widget, robot in self._widget_robots.items() if robot == name]
+            view["widgets"] |= {widget: own[widget] for widget in ids}
+        return view
 
     def share(self, robot: RobotState) -> None:
         has_moved = self._has_moved(robot)

@@ -380,7 +380,7 @@ def wire_session(
     peer = access.peer(context)
     recorder = _recorder(server, context, entry)
     if recorder is not None:
-        robot_alarms.stopped.connect(recorder.record_stop)
+        signals.stopped.connect(recorder.record_stop)
     recorders: list[SessionRecorder] = [*([recorder] if recorder else []), *_trend_recorders(context)]
     commands = RobotCommands(context, peer, press_guard, press_log, recorder, recipes)
     published_alarms = PublishedAlarms(
@@ -402,7 +402,7 @@ def wire_session(
         robot,
         commands.sample_handlers,
         [robot.table_entries, log_lines, published_alarms, *recorders, *map_listeners],
-        _observers(server, context, recorder),
+        _observers(server, context),
     )
     own_line = partial(_show_own_line, robot, refresher)
     session = RobotSession(
@@ -456,17 +456,14 @@ def wire_session(
     return session
 
 
-def _observers(
-    server: ServerParts, context: RobotContext, recorder: "Recorder | None"
-) -> "list[ChangeObserver]":
+def _observers(server: ServerParts, context: RobotContext) -> "list[ChangeObserver]":
     """What records the changes from which a stop is explained; nothing on a panel without a journal."""
     if server.journal is None:
         return []
     from app.cell.stops.changes import ChangeObserver
 
     observer = ChangeObserver(context.panel, context.robot, server.journal)
-    if recorder is not None:
-        observer.on_stop = recorder.record_stop
+    observer.on_stop = context.signals.stopped.emit
     context.signals.stepped.connect(observer.step)
     context.signals.ran.connect(observer.finish)
     return [observer]
@@ -523,6 +520,7 @@ def _connect(signals: RobotSignals, robot_alarms: RobotAlarms, session: RobotSes
     signals.ran.connect(session.clock.update)
     signals.changed.connect(turn.changed)
     signals.status_set.connect(turn.status_set)
+    robot_alarms.stopped.connect(signals.stopped.emit)
     robot_alarms.rows_changed.connect(refresher.refresh_alarms)
     robot_alarms.locks_changed.connect(turn.changed)
     robot_alarms.marks_changed.connect(refresher.refresh_values)

@@ -25,6 +25,7 @@ from app.cell.commands.holds import HoldController, HoldMessages
 from app.cell.commands.judge import PendingSamples, PressGuard, PressJudge
 from app.cell.commands.parameters import ParameterSync
 from app.cell.commands.presses import Presses
+from app.cell.commands.receipts import PressRecorder, Receipt
 from app.cell.commands.recipe_loads import Books, RecipeLoader
 from app.cell.commands.services import OptionLists, ServiceCalls
 from app.cell.link.peer import Peer, RobotContext, Signal
@@ -45,6 +46,25 @@ if TYPE_CHECKING:
 
 
 # Wires the commands of one robot: presses, holds and their trackers.
+
+
+class StopReceipts:
+    """Gives presses and receipts to the recorder, None for none. What the robot has aborted is a
+    stop."""
+
+    def __init__(self, recorder: PressRecorder | None, on_stop: Callable[[], None]) -> None:
+        self._recorder = recorder
+        self._on_stop = on_stop
+
+    def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
+        if self._recorder is not None:
+            self._recorder.record_press(press_id, widget, who, inputs)
+
+    def record_receipt(self, receipt: Receipt) -> None:
+        if receipt.outcome == "aborted":
+            self._on_stop()
+        if self._recorder is not None:
+            self._recorder.record_receipt(receipt)
 
 
 class RobotCommands:
@@ -92,7 +112,8 @@ class RobotCommands:
             lambda: any(each.has_immediate for each in (link, *context.awaited)),
         )
         judge = PressJudge(panel, robot, press_guard, arrivals)
-        self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
+        observed = StopReceipts(recorder, context.signals.stopped.emit)
+        self.presses = Presses(judge, self.dispatcher, press_log, robot.name, observed)
         self.holds = HoldController(
             panel,
             robot,
@@ -100,7 +121,7 @@ class RobotCommands:
             HoldMessages(interfaces, robot, link, self.dispatcher.check_inputs),
             asyncio.get_running_loop(),
             changed=changed,
-            recorder=recorder,
+            recorder=observed,
         )
 
     async def start(self) -> None:

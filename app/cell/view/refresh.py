@@ -22,6 +22,7 @@ from app.cell.view.publisher import ViewPublisher
 from app.cell.view.view import (
     NO_SHARED,
     SharedWidgets,
+    View,
     ViewContext,
     ViewWithDeadlines,
     build_view,
@@ -242,6 +243,15 @@ class ViewRefresher:
         """Shows the alarms now: they do not wait for a frame."""
         self._alarms_changed = True
         self._frame()
+
+    def whole_view(self) -> View:
+        """What the pages of the robot show at this moment, also those that no one looks at. Nothing of
+        it is published."""
+        built = build_view(self._panel, self._robot, time.monotonic(), self._sources.context())
+        shared = self._sources.others.shared_with(self._robot).widgets
+        view = built.view
+        view["link"] = self._link_times.dated(view["link"])
+        return {**view, "widgets": {**view["widgets"], **shared}} if shared else view
 
     @property
     def due(self) -> float:

@@ -229,10 +229,11 @@ def present_code(stored: str) -> str:
 
 def text_in(stored: str) -> Text:
     """The text in JSON of `as_json`, with its present code; ValueError if it is not one."""
-    return _text_in(json.loads(stored))
+    return text_from(json.loads(stored))
 
 
-def _text_in(stored: Any) -> Text:
+def text_from(stored: Any) -> Text:
+    """The text of what `as_json` returned, with its present code; ValueError if it is not one."""
     if not isinstance(stored, dict) or stored.keys() != {"code", "params"}:
         raise ValueError("it is no sentence with a code and params")
     code = present_code(stored["code"])
@@ -241,7 +242,7 @@ def _text_in(stored: Any) -> Text:
 
 def _param_in(stored: Any) -> Any:
     if isinstance(stored, dict):
-        return _text_in(stored)
+        return text_from(stored)
     return tuple(_param_in(element) for element in stored) if isinstance(stored, list) else stored
 
 

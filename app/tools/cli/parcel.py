@@ -16,10 +16,11 @@ from typing import Final
 
 from app.system.errors import KioskError, LogError, SettingsError
 from app.system.settings import Settings
-from app.tools.cli.arguments import add_settings, environment, port
+from app.tools.cli.arguments import add_settings, environment
 from app.tools.cli.output import OutputError, add_force, check_absent, draft_of
 from app.tools.cli.parser import Parser
-from app.tools.doctor.parcel import Moment, Server, load, moment_of, write_parcel
+from app.tools.doctor.parcel import Moment, Reach, load, moment_of, write_parcel
+from app.tools.doctor.shown_pages import Taker
 
 PROG: Final = "python -m app.cli parcel"
 PIECE: Final = 256 * 1024
@@ -42,10 +43,9 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         name = time.strftime("fault-%Y%m%d-%H%M%S.zip", time.localtime(moment.at))
         file = options.output or Path(name)
         check_absent(file, options.force)
-        server = Server(host=options.host, port=options.port)
         with draft_of(file, options.force) as draft, draft.open("wb") as stream:
             draft.chmod(0o600)
-            parcel = write_parcel(stream, settings, panel, moment, language, server)
+            parcel = write_parcel(stream, settings, panel, moment, language, Reach())
     except (OutputError, LogError) as error:
         print(error, file=sys.stderr)
         return 1
@@ -59,12 +59,17 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 
 def pieces(
-    settings: Settings, host: str, port: int, at: float, key: str, robot: str, language: str
+    settings: Settings,
+    stop: tuple[float, str, str],
+    language: str,
+    taker: tuple[str, frozenset[str]],
+    now: bytes | None,
 ) -> Iterator[bytes]:
-    """The zip for a server that listens there, piece by piece."""
+    """The zip for a server, piece by piece. `stop` is its time, robot and key, `taker` the role and the
+    groups of who gets it, `now` what the pages show now."""
     with TemporaryFile() as file:
-        server = Server(host=host, port=port)
-        write_parcel(file, settings, load(settings), Moment(at, robot, key), language, server)
+        reach = Reach(Taker(*taker), now)
+        write_parcel(file, settings, load(settings), Moment(*stop), language, reach)
         file.seek(0)
         while piece := file.read(PIECE):
             yield piece
@@ -83,8 +88,8 @@ def make_parser(prog: str) -> Parser:
         prog=prog,
         description="Writes a zip for the vendor's service desk with what is known of one stop: its"
         " story, the log and the alarms around it, the recordings, versions and hashes, the panel file"
-        " without its texts, and a layout for Lichtblick and Foxglove. It needs no running server; of"
-        " one it has the page that is shown now.",
+        " without its texts, the pages as they were shown at the stop, and a layout for Lichtblick and"
+        " Foxglove. It needs no running server.",
         epilog="Exit status: 0 written, 1 it can't be written, or there is no stop, 2 a mistake on the"
         " command line, in the settings or in the panel file.",
     )
@@ -99,8 +104,6 @@ def make_parser(prog: str) -> Parser:
     )
     add("--robot", default="", metavar="ID", help="of several robots; default: any")
     add("--language", metavar="TAG", help="such as de; default: that of the panel file")
-    add("--host", default="127.0.0.1", help="where the server listens; default: %(default)s")
-    add("--port", default=8000, type=port, help="default: %(default)s")
     add("-o", "--output", type=Path, metavar="FILE", help="the zip; default: one named by the time")
     add_force(parser)
     return parser

@@ -13,7 +13,6 @@ import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from html import escape
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
@@ -25,6 +24,8 @@ from app.cell.alarms.report import NAME as STATES
 from app.cell.alarms.store import NAME as ALARMS
 from app.cell.history.recording import FOLDER, PRESS_TOPIC
 from app.cell.session.stops import StopReader, StopStores, read_alarms
+from app.cell.stops.shown import FOLDER as VIEWS
+from app.cell.stops.shown import ShownView, from_bytes, shown_near
 from app.cell.stops.sources import PanelNames
 from app.cell.stops.story import AFTER_S, BEFORE_S, Stop, Story
 from app.panel import Panel, load_panel
@@ -45,7 +46,8 @@ from app.system.errors import KioskError, LogError
 from app.system.public import public_part
 from app.system.settings import Settings, shipped_path
 from app.tools.doctor.bundle import versions
-from app.tools.doctor.machine import MB, ask_server
+from app.tools.doctor.machine import MB
+from app.tools.doctor.shown_pages import Taker, page_files
 from app.web.pages.compiled_templates import COMPILED
 from app.web.pages.page_templates import PageTemplates
 from app.web.routes.stops import sort_and_number, story_answer, story_context
@@ -60,8 +62,7 @@ MOST_RECORDED: Final = 128 * MB  # bytes of all recordings
 MOST_SERIES: Final = 12  # of a panel of the layout
 ROWS_AT_ONCE: Final = 500
 FAULTS: Final = (KioskError, OSError, ValueError)  # with which a part is left out
-_SHEET: Final = re.compile(r'<link rel="stylesheet" href="([^"<>]{1,300})">')
-_SCRIPT: Final = re.compile(r"<script\b.*?</script>|<link rel=\"modulepreload\"[^>]*>", re.DOTALL)
+PAGES: Final = "pages/"
 _PATH: Final = re.compile(r"[A-Za-z0-9_.\[\]]+")  # of a field, as Foxglove reads it
 
 
@@ -83,12 +84,12 @@ class Moment(NamedTuple):
         return self.at + AFTER_S + LOG_S
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Server:
-    """Where a running server listens, None where there may be none."""
+class Reach(NamedTuple):
+    """What a parcel may have beside the data folder: `taker` is who gets it, `now` what the robot's
+    pages show now, as `app.cell.stops.shown` keeps it, None without a running server."""
 
-    host: str
-    port: int
+    taker: Taker = Taker()
+    now: bytes | None = None
 
 
 @dataclass(slots=True)
@@ -150,14 +151,14 @@ def write_parcel(
     panel: Panel,
     moment: Moment,
     language: str,
-    server: Server | None,
+    reach: Reach,
 ) -> ParcelFile:
     """Writes the zip into a stream; OSError if that fails."""
     folder = _data_folder(settings, panel)
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file:
         parcel = ParcelFile(file)
         _add_story(parcel, settings, panel, moment, language)
-        _add_page(parcel, panel, moment, server)
+        _add_pages(parcel, settings, panel, moment, language, reach)
         _add_log(parcel, folder, moment, language)
         _add_alarms(parcel, folder, moment, language)
         _add_recordings(parcel, folder, panel, moment)
@@ -231,31 +232,42 @@ async def _told(reader: StopReader, key: str) -> tuple[Story, float | None]:
     return story, await reader.end_of(story.stop)
 
 
-def _add_page(parcel: ParcelFile, panel: Panel, moment: Moment, server: Server | None) -> None:
-    """The values that were shown at the moment are kept by no store but recordings and the story."""
-    name = "page.html"
-    if server is None:
-        parcel.left_out.append((name, "no server was asked for it"))
+def _add_pages(
+    parcel: ParcelFile, settings: Settings, panel: Panel, moment: Moment, language: str, reach: Reach
+) -> None:
+    """As they were shown at the stop, else as they are now."""
+    robot = moment.robot or _robots(panel)[0]  # of an alarm of the panel itself the first one
+    found = shown_near(_data_folder(settings, panel), robot, moment.at)
+    parcel.left_out += found.faults
+    why = "what the pages showed at this moment was not kept"
+    if found.shown is not None:
+        try:
+            _draw(parcel, settings, panel, found.shown, language, reach.taker, True)
+            return
+        except FAULTS as error:
+            why = f"what the pages showed at the stop can't be drawn: {error}"
+    if reach.now is None:
+        now = "; the page of the stop in the panel gives a parcel with the pages as they are then"
+        parcel.left_out.append((PAGES, f"{why}{now}"))
         return
-    path = f"/robots/{moment.robot}/" if panel.robots else "/"
-    status, html = ask_server(server.host, server.port, path) or (0, "")
-    if status != 200 or not isinstance(html, str):
-        why = f"the server answered {status}" if status else f"no server answers on port {server.port}"
-        parcel.left_out.append((name, why))
-        return
+    with parcel.attempt(PAGES):
+        _draw(parcel, settings, panel, from_bytes(reach.now), language, reach.taker, False)
+        parcel.notes.append(f"The pages are not those of the stop: {why}.")
 
-    def sheet(link: re.Match[str]) -> str:
-        status, css = ask_server(server.host, server.port, link[1]) or (0, "")
-        return f"<style>{css}</style>" if status == 200 and isinstance(css, str) else ""
 
-    at = iso_time(time.time())
-    mark = f"<p><strong>Shown at {escape(at)}, not at the stop.</strong></p>"
-    text = _SHEET.sub(sheet, _SCRIPT.sub("", html)).replace("</body>", f"{mark}</body>")
-    parcel.add(name, f"the panel's page as it was at {at}, when this was made", text)
-    parcel.notes.append(
-        "What the page showed at the stop is not kept. story.html has what changed, the recordings what"
-        f" was received; page.html is of {at}, as a browser shows it that has not signed in."
-    )
+def _draw(
+    parcel: ParcelFile, settings: Settings, panel: Panel, shown: ShownView, language: str, taker: Taker,
+    at_stop: bool,
+) -> None:  # fmt: skip
+    at = iso_time(shown.at)
+    when = f"at the stop, {at}" if at_stop else f"at {at}, when this was made"
+    for page, html, why in page_files(settings, panel, shown, taker, language, at_stop):
+        name = f"{PAGES}{page}.html"
+        if why:
+            parcel.left_out.append((name, why))
+        else:
+            parcel.add(name, f'the page "{page}" as it was shown {when}', html)
+    parcel.left_out += [(f"{VIEWS}: {part}", "it was too large to be kept") for part in shown.left_out]
 
 
 def _add_log(parcel: ParcelFile, folder: Path, moment: Moment, language: str) -> None:

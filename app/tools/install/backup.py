@@ -23,6 +23,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any, Final
 
 from app.cell.recipes.book import FOLDER as RECIPES
+from app.cell.stops.shown import FOLDER as VIEWS
 from app.records.data_dir import LOCK, DataDir
 from app.records.database import NAME as LOG
 from app.records.database import VERSION as LOG_VERSION
@@ -40,7 +41,7 @@ MANIFEST: Final = "manifest.json"
 DATA: Final = "data/"
 PANEL: Final = "panel/"
 RECORDINGS: Final = "recordings"
-FOLDERS: Final = (KEPT, RECIPES)  # of the data folder; others are those of other panels
+FOLDERS: Final = (KEPT, RECIPES, VIEWS)  # of the data folder; others are those of other panels
 # What a database is while it is used, and what a killed process left behind.
 LEFT_OUT: Final = re.compile(r".*\.sqlite3-(wal|shm|journal)|.*\.(new|unfinished)|" + re.escape(LOCK))
 SET_ASIDE: Final = re.compile(r".*\.(damaged|found)-.*")  # no server writes these any more

@@ -157,24 +157,40 @@ class PageContext(TypedDict):
     machine_notes: Sequence[TextLike]
 
 
+class Reader(NamedTuple):
+    """For whom a page is rendered, and the query of its address. `embedded`: it is for a frame of
+    another page. `as_shown`: it only shows what a page whose scripts run had shown."""
+
+    who: Principal
+    language: str
+    display: DisplaySettings
+    query: Mapping[str, str] = {}
+    embedded: bool = False
+    as_shown: bool = False
+
+
+def reader_of(request: Request, who: Principal, embedded: bool = False) -> Reader:
+    caller = caller_of(request)
+    return Reader(who, caller.language, caller.display, request.query_params, embedded)
+
+
 def page_context(
-    request: Request,
     state: AppState,
     session: RobotSession,
     page: Page,
-    who: Principal,
+    reader: Reader,
     refresh_s: int,
-    embedded: bool = False,
     framed: "FramedPage | None" = None,
 ) -> PageContext:
-    """The context of a page for one request, but `inside`, which the page's own template renders.
-    `framed`: it is none of the panel's own. `embedded`: it is for a frame of another page."""
+    """The context of a page for one reader, but `inside`, which the page's own template renders.
+    `framed`: it is none of the panel's own."""
+    who, language, display, query, embedded, as_shown = reader
     publisher, rules = session.publisher, session.control.rules
-    receipt = _faded(state.fleet.receipt(session, request.query_params.get("receipt", "")))
+    receipt = _faded(state.fleet.receipt(session, query.get("receipt", "")))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     again |= {EMBED: 1} if embedded else {}
     now, wall = clock.server_now(), time.time()
-    panel, language = state.fleet.panel, caller_of(request).language
+    panel = state.fleet.panel
     lacks = unmet(panel.needs.named, who)
     no_role = OPERATOR in lacks
     if only_shows(session.panel.embed, embedded):
@@ -185,8 +201,9 @@ def page_context(
             who, publisher.view["control"], rules, language, others, panel.needs.named
         )
     with publisher.watching(publisher.shown_page(page.id)):
-        view = locked_without_scripts(publisher.for_audience(of_client), panel, page)
-    display = caller_of(request).display
+        view = publisher.for_audience(of_client)
+    if not as_shown:
+        view = locked_without_scripts(view, panel, page)
     embed = f"?{EMBED}=1" if embedded else ""
     back = f"{session.base}/pages/{page.id}"
     if framed:
@@ -231,6 +248,7 @@ def page_context(
         words={
             "embed": embed,
             "root": state.root,
+            "as_shown": as_shown,
             "may_act": of_client.has_control and not no_role,
             "no_role": no_role,
         }
@@ -245,13 +263,13 @@ def page_context(
         | ({"alarm_needs_control": role_reason(OPERATOR)} if no_role else {}),
         page_json=page_json(data, language),
         refresh_s=refresh_s,
-        since=None if RELOADED in request.query_params else round(now, 3),
+        since=None if RELOADED in query else round(now, 3),
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
-        refused=said_of(request.query_params.get("control", ""), [session.control_acts]),
+        refused=said_of(query.get("control", ""), [session.control_acts]),
         back=back,
-        alarm_refused=_alarm_refused(state, request.query_params.get("act", "")),
+        alarm_refused=_alarm_refused(state, query.get("act", "")),
     )
 
 
@@ -324,13 +342,12 @@ def framed_page(
         session.show()
     own, page_id = tuple(page.entries), FRAME_ONLY if page.robot else FRAME_OF_ALL
     frame = page_context(
-        request,
         state,
         session,
         Page.model_construct(None, id=page_id, title=page.title, own=own, groups=()),
-        who,
+        reader_of(request, who),
         REFRESH_S,
-        framed=page,
+        page,
     )
     html = state.templates.render(page.template, caller.language, **frame, **context)
     headers = {"cache-control": "no-store", "vary": "accept"}

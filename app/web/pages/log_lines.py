@@ -1,6 +1,6 @@
 """The lines of a log, as a page and `GET /widgets/{widget}/lines` have them in a reader's language."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from app.cell.robot.log_lines import Line, LogFilter
@@ -26,9 +26,15 @@ def newest_lines(session: RobotSession, language: str, widget: LogView) -> list[
     """The newest lines of a log, as many as a rendered page has."""
     kept = session.robot.log_lines[session.robot.key(widget.topic)]
     wanted = wanted_lines(session.panel, widget, language)
-    return [
-        line_values(*line, wanted.translate, language) for line in kept.newest(wanted, RENDERED).lines
-    ]
+    return lines_values(kept.newest(wanted, RENDERED).lines, wanted, language)
+
+
+def lines_values(
+    lines: Iterable[tuple[int, Line]], wanted: LogFilter, language: str
+) -> list[dict[str, Any]]:
+    """The attributes of the newest of these lines that are wanted, as many as a rendered page has."""
+    fitting = [line for line in lines if wanted.has(line[1])][-RENDERED:]
+    return [line_values(*line, wanted.translate, language) for line in fitting]
 
 
 def wanted_lines(

@@ -48,7 +48,6 @@ class PageTemplates:
         self._base = environment_of(folder, compiled)
         self._base.globals["icon"] = icon
         self._base.globals["cleaning_s"] = CLEANING_S
-        self._base.globals["failure"] = FAILURE
         self._base.globals["version"] = installed_version()
         self._base.globals["page_guard"] = PAGE_GUARD
         self._environments: dict[str, Environment] = {}
@@ -83,6 +82,12 @@ class PageTemplates:
         template = self.environment(language).get_template(name)
         return template.render(language=language, **context)
 
+    def screen(self, page: Page, language: str, context: Mapping[str, Any]) -> str:
+        """A page of the panel; `context` is that of `page_context`."""
+        widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
+        inside = self.inside(page, language, **widgets)
+        return self.render("screen.html", language, **{**context, "inside": inside})
+
     def _tile(
         self, language: str, widget: BaseWidget, shown: Mapping[str, Any], *context: Any
     ) -> Markup:
@@ -101,7 +106,8 @@ class PageTemplates:
             else:
                 self._failing.discard(widget.id)
                 return Markup(html)
-        return Markup(self.environment(language).get_template("_failed.html").render(widget=widget))
+        failed = self.environment(language).get_template("_failed.html")
+        return Markup(failed.render(widget=widget, why=shown.get("failed", FAILURE)))
 
     def inside(self, page: Page, language: str, **context: Any) -> Markup | None:
         """The HTML of a page's own template; None if it has none. `context` has what a widget's macro

@@ -15,7 +15,7 @@ from app.web.app_state import AppState, CurrentState
 from app.web.assets import EDITOR
 from app.web.caller import QUERY, caller_of, frame_ancestors, only_shows, says_embedded
 from app.web.pages.compiled_templates import template_names
-from app.web.pages.context import page_context
+from app.web.pages.context import page_context, reader_of
 from app.web.requests import PAGE, Described, errors
 from app.web.route_needs import check_page
 from app.web.security import POLICY, content_security_policy
@@ -133,11 +133,8 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     if session.control.rules.required and not embedded:
         session.control.loaded(who, refresh_s + GRACE_S, caller.opened_by_person)
         session.show()
-    language = caller.language
-    context = page_context(request, state, session, page, who, refresh_s, embedded)
-    widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
-    context["inside"] = state.templates.inside(page, language, **widgets)
-    html = state.templates.render("screen.html", language, **context)
+    context = page_context(state, session, page, reader_of(request, who, embedded), refresh_s)
+    html = state.templates.screen(page, caller.language, context)
     forms = "'none'" if only_shows(rules, embedded) else "'self'"
     policy = content_security_policy(frame_ancestors(rules, embedded), forms)
     headers = {"cache-control": "no-store", POLICY: policy}

@@ -4,7 +4,9 @@ import asyncio
 import secrets
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from datetime import datetime
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypedDict, get_args
 from urllib.parse import quote
@@ -17,6 +19,7 @@ from app.cell.alarms.report import shift_at
 from app.cell.alarms.shown import AskedReason, panel_id
 from app.cell.commands.acts import ActRequest
 from app.cell.commands.press import PRESS_ID
+from app.cell.session.session import RobotSession
 from app.cell.session.stops import StopReader, reason_given, stores_of
 from app.cell.stops.sources import PanelNames
 from app.cell.stops.story import MOST_EVENTS, Event, Line, Stop, StopSort, Story
@@ -388,13 +391,23 @@ async def parcel(request: Request, state: CurrentState, key: Key) -> Response:
     caller = caller_of(request)
     who, token = caller.identified()
     asked = ActRequest("parcel", who, values={"stop": stop.key, "began": iso_time(stop.at)})
-    acts = state.fleet.of_robot(stop.robot).shift_acts
+    session = state.fleet.of_robot(stop.robot)
+    acts = session.shift_acts
     with state.in_flight.track():
         receipt = await acts.act(asked, secrets.token_hex(8))
     if not receipt.done:
         raise LogError(receipt.reason)
-    made = state.doctor.parcel(stop.at, stop.key, stop.robot, caller.language)
+    now = partial(_shown_now, state, session)
+    made = state.doctor.parcel(stop, caller.language, who, now)
     return caller.with_client_cookie(await exported_zip(made, "fault"), token)
+
+
+async def _shown_now(state: AppState, session: RobotSession) -> bytes | None:
+    """What the pages of a robot show now; None where that is not known."""
+    views = state.fleet.stop_views
+    with suppress(LogError):  # it is too large
+        return await views.now(session) if views is not None else None
+    return None
 
 
 def _reader(state: AppState) -> StopReader:

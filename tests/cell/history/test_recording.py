@@ -15,7 +15,7 @@ from mcap.records import Message
 from rosbags.typesys import get_types_from_msg
 
 from app.cell.commands.press import fingerprint
-from app.cell.commands.receipts import Receipt
+from app.cell.commands.receipts import PressRecorder, Receipt
 from app.cell.history import recording
 from app.cell.history.recording import (
     COPY_BELOW_BYTES,
@@ -34,6 +34,7 @@ from app.cell.history.recording import (
     to_buffered,
 )
 from app.cell.robot.state import RobotState, Sample
+from app.cell.session.turn import StopReceipts
 from app.panel import load_panel
 from app.panel.rules import RecordRules
 from app.ros.messages import Structure
@@ -255,10 +256,16 @@ class Cell:
         at = time.monotonic() - ago
         self.recorder.record_sample("heard", Sample(payload, 1, at, time.time() - ago, "b1", sent=1.5))
 
-    def press(self, press_id: str = "p1", outcome: Any = "published") -> None:
-        self.recorder.record_press(press_id, "free", "10.0.0.1", {"message": "hello"})
+    def press(
+        self,
+        press_id: str = "p1",
+        outcome: Any = "published",
+        recorder: PressRecorder | None = None,
+    ) -> None:
+        recorder = recorder or self.recorder
+        recorder.record_press(press_id, "free", "10.0.0.1", {"message": "hello"})
         at, inputs = "2026-01-01T00:00:00.000+00:00", {"message": "hello"}
-        self.recorder.record_receipt(
+        recorder.record_receipt(
             Receipt(press_id, "free", outcome, "Sent.", at, "", inputs, fingerprint(inputs))
         )
 
@@ -517,7 +524,8 @@ def test_a_stop_soon_after_a_press_has_its_half_minute_too(run: Callable[..., No
 def test_a_goal_that_is_aborted_is_a_stop(run: Callable[..., None]) -> None:
     async def test(cell: Cell) -> None:
         cell.says("before", ago=25.0)
-        cell.press(outcome="aborted")
+        recorder = StopReceipts(cell.recorder, cell.recorder.record_stop)
+        cell.press(outcome="aborted", recorder=recorder)
         await pass_time(STOP_AFTER_S)
         await cell.finished(2)
         stop = next(path for path in files_of(cell) if path.name.endswith("-stop.mcap"))

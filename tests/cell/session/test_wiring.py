@@ -39,7 +39,8 @@ def test_each_signal_of_a_session_has_a_receiver() -> None:
         signals = vars(wired().context.signals)
         assert signals
         unheard = {name for name, signal in signals.items() if not signal._receivers}
-        assert unheard == {"stepped"}  # by the journal of changes, which this panel has not
+        # By the journal of changes and the recorder, which this panel has not.
+        assert unheard == {"stepped", "stopped"}
 
     asyncio.run(scene())
 

@@ -1,6 +1,7 @@
 """The fault parcel: each part of it, of a running server and of the data folder of one that has ended;
 stores that are damaged or not there; and no credential in it."""
 
+import gzip
 import io
 import json
 import re
@@ -15,13 +16,14 @@ from mcap.reader import make_reader
 
 from app.cell.alarms.report import NAME as STATES
 from app.cell.alarms.store import NAME as ALARMS
+from app.cell.stops.shown import FOLDER as VIEWS
 from app.records.copy import Comparison, read_copy
 from app.records.database import NAME as LOG
 from app.records.starts import sha256
 from app.records.verify import verify
 from app.system.public import LEFT_OUT
 from app.tools.cli.command import main
-from tests.support.parts import ROOT, Server, free_port, until
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import demo_server, panel_file
 from tests.support.users import add_user, token_of
 from tests.tools.doctor.secrets import FORMS, NUMBER, SECRET, secrets_in
@@ -31,6 +33,8 @@ NAMES: Final = {
     *("README.txt", "story.html", "story.json", "log.jsonl", "log.csv", "alarms.json", "alarms.csv"),
     *("panel.json", "versions.json", "layout.json"),
 }
+PAGE: Final = "pages/main.html"
+RUNNING: Final = '<b data-text="text">Running</b>'
 PATH: Final = "/state.data"
 TREND: Final = """
 [[page.widget]]
@@ -66,7 +70,7 @@ class Cell(NamedTuple):
     name: str
 
     def command(self, file: Path, *more: str) -> list[str]:
-        where = ["--data", str(self.data), "--port", str(free_port())]
+        where = ["--data", str(self.data)]
         return ["parcel", str(self.panel), *where, "-o", str(file), *more]
 
     def copied(self, folder: Path) -> "Cell":
@@ -102,6 +106,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
         key = keys(server)[0]
         at = datetime.fromisoformat(story(server, key)["stop"]["at"])
         record_at(server)
+        until(lambda: RUNNING in server.http.get("/").text, "the machine runs again", within_s=40)
         answer = server.http.get(f"/stops/{key}/parcel.zip", timeout=120)
         assert answer.status_code == 200, answer.text
         told = story(server, key)
@@ -122,7 +127,7 @@ def record_at(server: Server) -> None:
 
 def test_a_running_server_gives_each_part(cell: Cell) -> None:
     parts = cell.made
-    assert NAMES | {"page.html"} <= set(parts)
+    assert NAMES | {PAGE} <= set(parts)
     told = json.loads(parts["story.json"])
     for name in ("key", "sort", "id", "at"):
         assert told["stop"][name] == cell.told["stop"][name]
@@ -133,16 +138,18 @@ def test_a_running_server_gives_each_part(cell: Cell) -> None:
     assert "<script" not in html
     assert "http" not in html
     assert html.count("<tr") == len(told["lines"])
-    page = parts["page.html"].decode()
-    assert "Shown at" in page
+    page = parts[PAGE].decode()
+    assert "when the machine stopped" in page
     assert "<style>" in page
     assert "<script" not in page
     assert 'data-widget="start"' in page
+    assert '<b data-text="text">Fault</b>' in page  # the machine runs when the parcel is made
+    assert RUNNING not in page
     for name, content in parts.items():
         if name != "README.txt":
             size = f"{len(content):,} bytes"
             assert re.search(rf"{re.escape(name)} +{size}", readme(parts)), name
-    assert "What the page showed at the stop is not kept" in readme(parts)
+    assert 'the page "main" as it was shown at the stop' in readme(parts)
 
 
 def test_the_recording_has_the_messages_of_the_moment(cell: Cell) -> None:
@@ -206,9 +213,14 @@ def test_the_layout_has_the_topics_of_the_panel_file(cell: Cell) -> None:
 
 def test_no_credential_is_in_it(cell: Cell) -> None:
     texts = {name: content.decode("latin-1") for name, content in cell.made.items()}
-    # The page as everyone sees it has the texts of the panel file.
-    assert SECRET in texts.pop("page.html")
+    # The page as everyone sees it has the texts of the panel file, and nothing else of them.
+    page = texts.pop(PAGE)
+    assert page.count(SECRET) == sum(form.count(SECRET) for form in FORMS)
     assert secrets_in(texts) == []
+    views = list((cell.data / VIEWS).iterdir())
+    assert views
+    kept = {file.name: gzip.decompress(file.read_bytes()).decode() for file in views}
+    assert secrets_in(kept) == []
 
 
 def test_the_command_reads_the_folder_of_a_server_that_has_ended(
@@ -224,8 +236,9 @@ def test_the_command_reads_the_folder_of_a_server_that_has_ended(
     assert told["stop"]["key"] == cell.key
     assert "安全扉" in told["sentence"]
     assert any(name.startswith("recordings/") for name in parts)
-    assert "left out: page.html: no server answers on port" in capsys.readouterr().err
-    assert "page.html: no server answers on port" in readme(parts)
+    page = parts[PAGE].decode()
+    assert "機械が停止したときの表示" in page
+    assert '<b data-text="text">異常</b>' in page
     assert main(cell.command(file)) == 1
     assert f"{file} exists" in capsys.readouterr().err
     assert main(cell.command(file, "--force")) == 0
@@ -332,6 +345,8 @@ def test_a_panel_that_records_nothing_says_so(cell: Cell, tmp_path: Path) -> Non
     assert main(plain.command(file, "--at", cell.at.isoformat())) == 0
     parts = parts_of(file.read_bytes())
     assert "recordings/: the panel records nothing" in readme(parts)
+    assert PAGE not in parts
+    assert re.search(r"pages/: .*can't be drawn: the panel file has been changed since", readme(parts))
     assert "The panel file has been changed since" in readme(parts)
 
 
@@ -354,7 +369,9 @@ def test_who_may_take_it(tmp_path: Path) -> None:
     data.mkdir(mode=0o700)
     add_user(data, "O. Tanaka", "operator", pin="2580")
     add_user(data, "M. Sato", "maintenance", pin="1470")
-    with demo_server(tmp_path, f"{PANEL}\n[access]\nopen = false\n", KIOSK_DATA=str(data)) as server:
+    deep = '[[page]]\nid = "deep"\ntitle = "Deep"\nneeds = "engineer"\n[[alarm]]'
+    panel = PANEL.replace("[[alarm]]", deep, 1) + "\n[access]\nopen = false\n"
+    with demo_server(tmp_path, panel, KIOSK_DATA=str(data)) as server:
         for user, pin, status in (("O. Tanaka", "2580", 403), ("M. Sato", "1470", 200)):
             server.http.post("/session", json={"user": user, "pin": pin}).raise_for_status()
             key = str(until(lambda: (keys(server) or [""])[0], "it has stopped", within_s=40))
@@ -362,4 +379,47 @@ def test_who_may_take_it(tmp_path: Path) -> None:
             assert (f"/stops/{key}/parcel.zip" in page) == (status == 200)
             answer = server.http.get(f"/stops/{key}/parcel.zip", timeout=120)
             assert answer.status_code == status
+        parts = parts_of(answer.content)
+        assert PAGE in parts
+        assert "pages/deep.html: it needs the role or group engineer" in readme(parts)
         assert server.http.get("/stops/state-99999/parcel.zip").status_code == 404
+
+
+@pytest.mark.parametrize("is_damaged", [False, True])
+def test_without_what_was_kept_the_pages_are_those_of_now(tmp_path: Path, is_damaged: bool) -> None:
+    with demo_server(tmp_path, PANEL) as server:
+        folder = server.data / VIEWS
+        until(lambda: keys(server) and list(folder.glob("*.gz")), "it has stopped", within_s=40)
+        for file in folder.iterdir():
+            if is_damaged:
+                file.write_bytes(file.read_bytes()[:-20])
+            else:
+                file.unlink()
+        answer = server.http.get(f"/stops/{keys(server)[-1]}/parcel.zip", timeout=120)
+        parts = parts_of(answer.content)
+        assert "not at the stop" in parts[PAGE].decode()
+        assert "The pages are not those of the stop: what the pages showed" in readme(parts)
+        damaged = re.search(rf"{VIEWS}/[0-9]+\.json\.gz: it is not whole", readme(parts))
+        assert (damaged is not None) == is_damaged
+
+
+def test_a_stop_of_one_of_several_robots_has_its_pages(tmp_path: Path) -> None:
+    robots = "".join(
+        f'[[robot]]\nid = "{name}"\nname = "{name.title()}"\nnamespace = "/{name}"\n'
+        for name in ("left", "right")
+    )
+    with demo_server(tmp_path, PANEL.replace("[state]", f"{robots}[state]", 1)) as server:
+        folder = server.data / VIEWS
+        until(lambda: len(keys(server)) > 1, "both have stopped", within_s=40)
+        until(lambda: {*folder.glob("*-left.*")} and {*folder.glob("*-right.*")}, "both are kept")
+        seen = set()
+        for key in keys(server)[-2:]:
+            robot = story(server, key)["stop"]["robot"]
+            answer = server.http.get(f"/stops/{key}/parcel.zip", timeout=120)
+            parts = parts_of(answer.content)
+            page = parts[PAGE].decode()
+            assert f"<title>Main – {robot.title()} – Cell</title>" in page
+            assert "when the machine stopped" in page
+            assert '<b data-text="text">Fault</b>' in page
+            seen.add(robot)
+        assert seen == {"left", "right"}

@@ -39,6 +39,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         until(server.ready, "ready", within_s=60)
         (folder / "data/recordings").mkdir(exist_ok=True)
         (folder / "data/recordings/old.mcap").write_bytes(b"recording")
+        (folder / "data/stop-views").mkdir(exist_ok=True)
+        for name in ("1800000000000.json.gz", "1800000000001.json.gz.new"):
+            (folder / "data/stop-views" / name).write_bytes(b"view")
         assert main(["backup", "--data", str(folder / "data"), str(folder / "a.zip")]) == 0
         assert main(["restore", "--data", str(folder / "data"), str(folder / "a.zip")]) == 1
     finally:
@@ -106,6 +109,9 @@ def test_a_backup_beside_a_server_is_restored_and_the_log_says_so(
     with zipfile.ZipFile(file) as packed:
         names = set(packed.namelist())
     assert {f"data/{NAME}", "data/log-key.pem", "data/alarms.sqlite3", "panel/panel.toml"} <= names
+    assert [name for name in sorted(names) if "stop-views" in name] == [
+        "data/stop-views/1800000000000.json.gz"
+    ]
     assert not any("recordings" in name or "lock" in name for name in names)
     data.mkdir()
     (data / "recordings").mkdir()
