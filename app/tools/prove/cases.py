@@ -48,12 +48,6 @@ class Case(NamedTuple):
     situation: Situation
 
 
-class AlarmCase(NamedTuple):
-    """An alarm that is raised, shown, acknowledged and returns."""
-
-    alarm: str
-
-
 class HoldCase(NamedTuple):
     """A hold that ends in a way; `guard` is the interlock that forbids, else ""."""
 

@@ -447,9 +447,9 @@ class _Round:
                     for guarded in self._plan.controls.values():
                         if persona == guarded.enough:
                             self._permit_for(guarded, interlocks)
-                            self._report(
-                                str(guarded.control.id), "", "role_enough", self._arrives(guarded)
-                            )
+                            fault = self._arrives(guarded)
+                            self._await_free(str(guarded.control.id))  # its page follows the sign-in
+                            self._report(str(guarded.control.id), "", "role_enough", fault)
                         elif persona == guarded.less:
                             self._permit_for(guarded, interlocks)
                             fault = self._refuses(guarded)

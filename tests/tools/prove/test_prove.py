@@ -257,6 +257,7 @@ def test_roles_and_confirmations_are_tried_by_users_of_the_proof(oven: Panel) ->
     for control in ("heat", "bypass", "approve", "jog"):
         assert {(control, "role_enough"), (control, "role_less"), (control, "no_role")} <= tried
         assert (control, "permits") in tried
+    assert {row.shown for row in proof.results if row.situation == "role_enough"} == {""}
 
 
 def test_wrong_pins_delay_nothing_that_is_tried_next(oven: Panel, tmp_path: Path) -> None:
