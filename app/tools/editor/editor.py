@@ -124,11 +124,13 @@ class Editor:
         """Takes what others write into the file, for ever; what both have changed waits for Save."""
         while True:
             await asyncio.sleep(WATCH_S)
-            has_conflicts = bool(self.session.conflicts)
             was_gone, self._is_gone = self._is_gone, self.session.disk_state == "gone"
             if was_gone != self._is_gone:
                 self.notify()
-            if self.session.disk_state != "changed" or has_conflicts:
+            session = self.session
+            if not (
+                session.has_old_conflicts if session.conflicts else session.disk_state == "changed"
+            ):
                 continue
             revision = self.document.revision
             with contextlib.suppress(SaveConflict):

@@ -838,7 +838,7 @@ class _Maker:
             name=key_name(key, name),
             raw=table.get(key),
             default=made.default or ("" if default is None else _shown(default)),
-            unset=_unset(name, key),
+            unset=_unset(name, key) or _default_choice(made, default),
             help=help_text,
             label=f"{title_of(table, self.language)}: {key}".removeprefix(": "),
             unit=unit_of(key) or own_unit or self._type_beside(path, name, table),
@@ -1422,6 +1422,15 @@ def _unset(name: str, key: str) -> TextLike:
     if key != "needs":
         return ""
     return say("role_operator") if is_command(name) else say("form_everybody")
+
+
+def _default_choice(made: Field, default: Any) -> TextLike:
+    """The name of the choice that counts without an entry."""
+    if made.control != "choice" or default is None:
+        return ""
+    text = next((choice.text for choice in made.choices if _is_same(choice.value, default)), "")
+    is_priority = str(made.key).endswith("priority")  # half a row is wide enough for its name only
+    return say("form_default", value=text) if text and not is_priority else text
 
 
 def _choice_name(value: Any) -> TextLike:

@@ -54,7 +54,9 @@ class Node(NamedTuple):
 
 
 def outline(tables: Tables, language: str) -> Iterator[Node]:
-    """The lines of the tree, all open."""
+    """The lines of the tree, all open; the first is the panel itself."""
+    title = text_of(tables, language)
+    yield Node((), 1, _known("panels-top-left"), say("form_table_panel"), title, 0)
     names = [*SECTIONS, *(key for key in tables if key not in SECTIONS)]
     for name in names:
         value = tables.get(name)

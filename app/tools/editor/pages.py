@@ -1,7 +1,9 @@
 """The editor's page and its panes: what their templates are rendered with."""
 
 import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path as FilePath
 from typing import Any, Final, NamedTuple
 
 from app.panel.file.toml_lines import Path
@@ -15,7 +17,18 @@ from app.tools.editor.alarm_curve import curve_pane
 from app.tools.editor.document import DiffLine
 from app.tools.editor.editor import Editor, Part, PartRequest
 from app.tools.editor.form_keys import list_of
-from app.tools.editor.forms import FormPage, Link, RobotNames, form_context, form_of, table_path
+from app.tools.editor.forms import (
+    FormPage,
+    Link,
+    NoTableError,
+    RobotNames,
+    element_id,
+    form_context,
+    form_of,
+    schema,
+    table_path,
+)
+from app.tools.editor.forms import table_at as table_name_at
 from app.tools.editor.merge_page import merge_page, recovered_page
 from app.tools.editor.outline import outline, text_of
 from app.tools.editor.paths import (
@@ -48,10 +61,13 @@ LEFT_WORDS: Final = {
 }
 
 _FITS: Final = re.compile(r"fits ([0-9x, ]+)")
+# A key in a message of `check`: "topic", max_age_s, role = "stop".
+_KEY_NAMED: Final = re.compile(r'"([a-z_]+)"|\b([a-z]+(?:_[a-z]+)+)\b|\b([a-z]+) = ')
 _NO_FIT: Final = re.compile(r"does not fit (\d+x\d+): ([^;]+)")
 # The words of the page itself.
 WORDS: Final = {
     "close": say("editor_close"),
+    "close_unsaved": say("editor_close_unsaved"),
     "undo": say("editor_undo"),
     "redo": say("editor_redo"),
     "arrange": say("editor_arrange"),
@@ -61,7 +77,6 @@ WORDS: Final = {
     "languages": say("editor_languages"),
     "theme": say("editor_theme"),
     "mode": say("editor_mode"),
-    "preview": say("editor_preview"),
     "before_faults": say("editor_before_faults"),
     "preview_keys": say("editor_preview_keys"),
     "file_pane": say("editor_file_pane"),
@@ -103,8 +118,20 @@ def page_context(editor: Editor, language: str, revision: str, person: str) -> d
         "themes": [(name, icon, say(word)) for name, icon, word in THEMES],
         "shown_theme": panel.theme if panel is not None else "light",
         "left": [(name, say(LEFT_WORDS[name])) for name in LEFT],
-        "words": WORDS,
+        "shown_left": _shown_left(editor),
+        "words": {**WORDS, "preview": _preview_words(editor)},
     }
+
+
+def _shown_left(editor: Editor) -> str:
+    """The pane on the left at first: of a new file the one that adds to it."""
+    if not editor.is_new:
+        return "outline"
+    return "robot" if editor.preview.is_live else "parts"
+
+
+def _preview_words(editor: Editor) -> TextLike:
+    return say("editor_preview" if editor.preview.is_live else "editor_preview_simulated")
 
 
 def _strings(value: Any) -> list[str]:
@@ -161,7 +188,8 @@ def _outline(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
 
 
 class FaultRow(NamedTuple):
-    """`path` is the table that it selects. `about` names it, as `check` does."""
+    """`path` is the table that it selects, `field` the id of the field there that it is about, "" if it
+    is about none. `about` names it, as `check` does."""
 
     is_fault: bool
     about: str
@@ -169,6 +197,7 @@ class FaultRow(NamedTuple):
     line: int
     path: Path
     page: str
+    field: str = ""
     repair: Repair | None = None
 
 
@@ -203,7 +232,24 @@ def _fault_row(remark: Remark, is_fault: bool, tables: Mapping[str, Any]) -> Fau
     key = path[len(table)] if len(path) > len(table) else ""
     name = remark.id or title_of(at(tables, table)) or (kind_of(tables, table) if table else "")
     about = ": ".join(filter(None, (name, str(key))))
-    return FaultRow(is_fault, about, remark.message, remark.line, table, page_of(table, tables))
+    page, field = page_of(table, tables), _field_of(remark, path, table, tables)
+    return FaultRow(is_fault, about, remark.message, remark.line, table, page, field)
+
+
+def _field_of(remark: Remark, path: Path, table: Path, tables: Mapping[str, Any]) -> str:
+    """The id of the field of the key that a remark is about: its place, else the first key which it
+    names and its table does not have."""
+    if len(path) > len(table):
+        return element_id(path)
+    try:
+        known = schema()[table_name_at(tables, table)]["properties"]
+    except NoTableError:
+        return ""
+    there = at(tables, table)
+    named = (next(filter(None, match.groups())) for match in _KEY_NAMED.finditer(remark.message))
+    missing = (key for key in named if key in known and key not in (there or {}))
+    key = next(missing, "")
+    return element_id((*table, key)) if key else ""
 
 
 def _diff(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
@@ -215,8 +261,23 @@ def _diff(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
         "lines": lines if new else (),
         "title": say("editor_diff"),
         "nothing": say("editor_nothing_to_save"),
+        "commands": _commands(request.editor),
         "count": say("editor_diff_count", changed=new, lines=total) if new else "",
     }
+
+
+def _commands(editor: Editor) -> Sequence[tuple[TextLike, str]]:
+    """(what it does, the command) that serve the saved file; none if it has faults or is not there."""
+    session = editor.session
+    if editor.checked.faults or not session.base_text.strip():
+        return ()
+    file, folder = session.path.absolute(), FilePath.cwd()
+    name = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+    command = shlex.join(["operator-panel", "run", name])
+    if editor.document.tables.get("mode", "live") == "demo":
+        return ((say("editor_serve_simulated"), command),)
+    simulated = (say("editor_serve_simulated"), f"KIOSK_MODE=demo {command}")
+    return ((say("editor_serve_live"), command), *(() if editor.preview.is_live else (simulated,)))
 
 
 def _with_gaps(lines: Sequence[DiffLine], total: int) -> list[tuple[str, int, TextLike]]:

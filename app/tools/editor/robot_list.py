@@ -516,6 +516,8 @@ def uses_of(panel: Panel) -> dict[tuple[Section, str], Sequence[TextLike]]:
     for alarm in panel.alarms:
         for source in alarm.sources():
             used["topics", source.topic][say("editor_alarm")] = None
+        if alarm.when is not None:
+            used["topics", alarm.when.topic][say("editor_alarm")] = None
     return {key: list(places) for key, places in used.items()}
 
 

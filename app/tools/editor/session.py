@@ -124,6 +124,7 @@ class EditSession:
         self.recovered: Recovered | None = None
         self._clock = clock
         self._choices: dict[str, Side | tuple[str]] = {}
+        self._conflicting = b""  # what the file had that the conflicts are with
         self._lock: int | None = None
         self._base = self._read()
         self.document = Document(_decoded(self._base, path))
@@ -256,16 +257,27 @@ class EditSession:
         except OSError:
             return "same"  # it can't be read now: nothing is known to have changed
 
+    @property
+    def has_old_conflicts(self) -> bool:
+        """Whether its conflicts are with a text that the file no longer has, as with the half of one
+        that a program was writing."""
+        try:
+            return bool(self.conflicts) and self.path.read_bytes() != self._conflicting
+        except OSError:
+            return False
+
     def merge_from_disk(self, author: str = "") -> bool:
         """Takes the changes that others have made in the file, as one step. Returns whether there are
         some; SaveConflict if both have changed the same tables."""
         disk = self._read()
         if disk == self._base:
+            self.conflicts = ()
             return False
         theirs = _decoded(disk, self.path).removeprefix(BOM)
         merged = merge(self.base_text, self.document.text, theirs, self._choices)
         self.conflicts = merged.conflicts
         if merged.conflicts:
+            self._conflicting = disk
             raise SaveConflict(say("edit_conflicts", number=len(merged.conflicts)))
         self._choices = {}
         self._base = disk

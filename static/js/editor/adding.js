@@ -18,6 +18,7 @@ const overlay = /** @type {HTMLElement} */ (document.getElementById("overlay"));
 const ask = /** @type {HTMLDialogElement} */ (document.getElementById("ask"));
 
 let sought = "";
+let soughtIn = ""; // the pane where that was typed
 let rows = 0; // the version of the rows that the pane shows
 
 const items = () => [...left.querySelectorAll(".offer")];
@@ -183,6 +184,8 @@ export function start() {
   ask.addEventListener("keydown", onPickKey);
   onPane((pane) => {
     if (pane !== left) return;
+    if (left.dataset.part !== soughtIn) sought = "";
+    soughtIn = left.dataset.part ?? "";
     const field = left.querySelector('input[name="find"]');
     if (field instanceof HTMLInputElement) field.value = sought;
     filter();

@@ -186,6 +186,13 @@ export class Form {
     return this.refresh();
   }
 
+  // Puts the focus into the field with this id, or into the first one in it, when the form is drawn.
+  /** @param {string} id */
+  async focus(id) {
+    await this.#drawing;
+    this.#focusIn(document.getElementById(id), `${CONTROLS}, summary`);
+  }
+
   // Posts what is being typed, and waits until all that was posted has an answer.
   enter() {
     const entry = document.activeElement;
@@ -359,15 +366,22 @@ export class Form {
   #focusAfter(then, list, isNew) {
     const made = then ? document.getElementById(then) : null;
     if (made) {
-      for (let around = /** @type {Element | null} */ (made); around; around = around.parentElement) {
-        if (around instanceof HTMLDetailsElement) around.open = true;
-      }
-      made.scrollIntoView({ block: "nearest" });
-      const first = isNew ? "input, select, textarea" : "summary";
-      /** @type {HTMLElement | null} */ (made.querySelector(first))?.focus();
+      this.#focusIn(made, isNew ? "input, select, textarea" : "summary");
     } else if (document.activeElement === document.body) {
       /** @type {HTMLElement | null} */ (list?.querySelector("button:not(:disabled), input, summary"))?.focus();
     }
+  }
+
+  // Opens what is folded around an element, and focuses it, or its first control.
+  /** @param {HTMLElement | null} element @param {string} controls */
+  #focusIn(element, controls) {
+    if (!element || !this.#pane.contains(element)) return;
+    for (let around = /** @type {Element | null} */ (element); around; around = around.parentElement) {
+      if (around instanceof HTMLDetailsElement) around.open = true;
+    }
+    const control = element.matches(controls) ? element : element.querySelector(controls);
+    /** @type {HTMLElement | null} */ (control)?.focus();
+    element.scrollIntoView({ block: "nearest" }); // the help below has its height now
   }
 
   /** @param {Partial<View>} change */

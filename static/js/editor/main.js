@@ -10,7 +10,7 @@ import * as preview from "./preview.js";
 import { select } from "./selection.js";
 import * as sending from "./send.js";
 import * as starting from "./start.js";
-import { edit, onMessage, onState, open, step } from "./wire.js";
+import { edit, onMessage, onState, open, say, state, step } from "./wire.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -74,6 +74,22 @@ onState((now, before) => {
   title.textContent = (now.faults ? title.dataset.faulty : title.dataset.good) ?? "";
   title.classList.toggle("faulty", now.faults > 0);
   if (now.drawn !== before.drawn) areKeysOld = true;
+});
+
+// The address of a page that is closed is gone with it: what is not saved is said first, until something else is done.
+let isWarned = false;
+const warn = () => say(isWarned ? (get("close").dataset.unsaved ?? "") : "");
+document.addEventListener("click", (event) => {
+  const isClose = event.target instanceof Element && event.target.closest("#close");
+  if (isClose ? state.saved || isWarned : !isWarned) return;
+  if (isClose) event.preventDefault();
+  isWarned = Boolean(isClose);
+  warn();
+});
+onState((now) => {
+  if (!isWarned) return;
+  isWarned = !now.saved;
+  warn();
 });
 
 let areKeysOld = false;

@@ -44,7 +44,10 @@ function show() {
 function showFound() {
   const all = lines();
   const wanted = all.filter((line) => line.textContent?.toLowerCase().includes(sought) || false);
-  for (const line of all) line.hidden = !wanted.some((found) => isAround(pathOf(line), pathOf(found)));
+  for (const line of all) {
+    const own = pathOf(line); // that of the panel is around everything
+    line.hidden = !wanted.some((found) => found === line || (own.length && isAround(own, pathOf(found))));
+  }
 }
 
 /** @param {HTMLElement} line @param {boolean} isOpen */

@@ -34,7 +34,7 @@ async function fillAll() {
   await Promise.all([shown.refresh(), fill(faults, "faults"), fill(diff, "diff")]);
   // The robot's list asks by itself whether it has other rows; the kinds are always the same.
   const name = left.dataset.part ?? "outline";
-  if (name === "outline") await fill(left, name);
+  if (name === "outline" || !left.childElementCount) await fill(left, name);
 }
 
 /** @type {Map<HTMLElement, number>} */
@@ -128,6 +128,7 @@ function onClick(event) {
   if (tab?.dataset.tab) showTab(tab.dataset.tab);
   const chosen = target?.closest("[data-select]");
   if (chosen?.dataset.select) select(JSON.parse(chosen.dataset.select), "list");
+  if (chosen?.dataset.field) shown.focus(chosen.dataset.field);
 }
 
 export function start() {

@@ -142,6 +142,15 @@ def test_words_filter_the_list_and_escape_adds_nothing(desk: Page, running: Edit
     assert written(running) == before
 
 
+def test_words_of_a_search_stay_in_their_pane(desk: Page) -> None:
+    desk.locator("#tab-parts").click()
+    desk.get_by_placeholder("Name of a part").fill("alarm")
+    expect(desk.locator(".offer:visible")).to_have_count(3)
+    desk.locator("#tab-robot").click()
+    expect(desk.get_by_placeholder("Name, type or node")).to_have_value("")
+    expect(desk.locator(".offer:visible").filter(has_text="/speed")).to_have_count(1)
+
+
 def test_escape_finds_the_line_in_a_list_that_came_again_meanwhile(desk: Page) -> None:
     line = item(desk, "robot", "/load")
     line.press("Enter")

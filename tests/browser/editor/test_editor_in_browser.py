@@ -9,6 +9,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, FilePayload, Page, Route, expect
 
+from app.tools.editor.forms import element_id
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
 from tests.support.editor import PANEL, EditorServer, box_of, editing, middle, preview
@@ -161,6 +162,24 @@ def test_undo_redo_and_save_by_keys(desk: Page, editor: EditorServer) -> None:
     assert 'label = "Belt speed"      # shown large' in editor.file.read_text()
 
 
+def test_closing_says_once_that_changes_are_not_saved(desk: Page, editor: EditorServer) -> None:
+    editor.edit({"op": "set", "path": [*SPEED, "label"], "value": "Belt"}).raise_for_status()
+    expect(desk.locator("#status")).to_have_text("1 change, not saved")
+    desk.locator("#close").click()
+    expect(desk.locator("#message")).to_contain_text("not saved")
+    editor.edit({"op": "set", "path": [*SPEED, "label"], "value": "Belts"}).raise_for_status()
+    expect(desk.locator("#status")).to_have_text("2 changes, not saved")
+    expect(desk.locator("#message")).to_contain_text("not saved")  # whatever happens in the meantime
+    desk.locator("#tab-robot").click()
+    expect(desk.locator("#message")).to_be_hidden()
+    desk.locator("#close").click()
+    expect(desk.locator("#message")).to_contain_text("not saved")
+    desk.locator("#close").click()
+    desk.wait_for_url("about:blank")
+    opened(desk, editor)
+    expect(desk.locator("#status")).to_have_text("2 changes, not saved")  # the server has it
+
+
 def test_move_and_resize_by_keys(desk: Page, editor: EditorServer) -> None:
     select(desk, "#at-speed", SPEED)
     desk.keyboard.press("Alt+ArrowRight")
@@ -265,8 +284,7 @@ def test_a_size_says_whether_the_page_fits_it(desk: Page, editor: EditorServer) 
 
 def test_the_outline_by_keys(desk: Page) -> None:
     tree = desk.locator(".tree")
-    first = tree.locator(".tr").first
-    first.focus()
+    tree.locator(".tr").nth(1).focus()
     desk.keyboard.press("ArrowDown")
     focused = tree.locator(".tr:focus")
     expect(focused).to_have_text("Cell2")
@@ -279,7 +297,10 @@ def test_the_outline_by_keys(desk: Page) -> None:
     expect(preview(desk).locator("#at-load")).to_be_visible()
     expect(desk.locator(CHOSEN)).to_have_text("Watch1")
     desk.keyboard.press("Home")
-    expect(focused).to_have_text("Pages2")
+    expect(focused).to_have_text("PanelCell")
+    desk.keyboard.press("Enter")
+    expect(desk.locator("#form .form")).to_have_attribute("data-form", "[]")
+    expect(desk.locator("#form-title")).to_have_value("Cell")
     desk.locator(".find input").fill("open")
     expect(tree.locator(".tr:visible")).to_have_text(["Pages2", "Cell2", "Gripper1", "opencall"])
 
@@ -293,6 +314,20 @@ def test_a_fault_selects_its_place_and_marks_it(desk: Page, editor: EditorServer
     fault.click()
     until(lambda: chosen(desk) == SPEED, "it selects its place")
     expect(preview(desk).locator("#at-speed")).to_be_visible()
+    field = element_id(("page", 0, "group", 0, "widget", 0, "field"))
+    expect(desk.locator(f'[id="{field}"]')).to_be_focused()
+
+
+def test_a_note_leads_to_the_key_that_it_asks_for(desk: Page, editor: EditorServer) -> None:
+    lock = {"id": "ready", "topic": "/ready", "type": "std_msgs/msg/Bool", "label": "ready"}
+    editor.edit(
+        {"op": "insert", "path": ["interlock", 0], "value": lock},
+        {"op": "set", "path": [*OPEN, "interlock"], "value": "ready"},
+    ).raise_for_status()
+    note = desk.locator(".fault").filter(has_text="give max_age_s")
+    note.click()
+    expect(desk.get_by_label("Old after", exact=True)).to_be_focused()
+    expect(desk.locator(".form-help")).to_contain_text("max_age_s: ")
 
 
 def test_the_only_repair_of_a_fault_is_a_press_away(desk: Page, editor: EditorServer) -> None:
@@ -404,6 +439,7 @@ def test_a_new_file_and_a_page_of_another_are_chosen_by_keys(page: Page, tmp_pat
     try:
         page.goto(editor.address)
         expect(page.locator("#start-from")).to_be_visible()
+        expect(page.locator("#left .offer.part").first).to_be_visible()  # what can be added
         page.locator("#start-from").press("Enter")
         expect(page.get_by_role("button", name="The robot that is there")).to_be_focused()
         page.get_by_role("button", name="other.toml: Cell").press("Enter")

@@ -14,6 +14,7 @@ from app.panel.file.toml_lines import Path
 from app.panel.reference.schema import SAME, WIDGET
 from app.ros.messages import Interfaces, load_interfaces
 from app.system.settings import shipped_path
+from app.system.texts import render
 from app.system.toml_values import value_text
 from app.tools.editor.document import Document, edit_from
 from app.tools.editor.forms import (
@@ -210,6 +211,27 @@ def test_texts_of_the_panels_languages_stand_side_by_side_and_one_is_missing() -
     assert [text.tag for text in label.texts] == ["en", "ja"]
     assert label.texts[1].around == {"en": "Boxes"}
     assert not any(text.missing for text in label.texts)  # one text is for all languages
+
+
+@pytest.mark.parametrize(
+    ("key", "says"),
+    [
+        ("colour", "grey (default)"),
+        ("grow", "Off (default)"),
+        ("priority", "Low"),
+        ("needs", "everybody"),
+    ],
+)
+def test_a_choice_names_what_counts_without_it(key: str, says: str) -> None:
+    lamp = {
+        "id": "l",
+        "kind": "indicator",
+        "states": [{"value": True, "text": "On", "shape": "circle"}],
+    }
+    tables = {"page": [{"id": "p", "widget": [lamp]}], "alarm": [{"id": "a", "low": 5}]}
+    path = ("page", 0, "widget", 0) if key in ("colour", "grow") else ("alarm", 0)
+    shown = next(each for each in form_of(tables, path).fields if each.key == key)
+    assert render(shown.unset, "en") == says
 
 
 def test_another_kind_keeps_what_it_knows_and_says_what_goes() -> None:

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -13,12 +14,22 @@ from app.panel.layout import Frame
 from app.ros.messages import Type, load_interfaces
 from app.system.settings import shipped_path
 from app.system.texts import render
-from app.tools.editor.robot_list import RobotList, Row, fields_of, short
+from app.tools.editor.robot_list import RobotList, Row, fields_of, short, uses_of
 from app.tools.robot.link import Place
 from app.tools.simulator.in_process import in_process
 from tests.support.places import SHIPPED
 
 WITHIN_S: Final = 20.0
+WITH_ALARM: Final = """
+title = "Cell"
+[[page]]
+id = "main"
+title = "Main"
+[[alarm]]
+id = "not_ready"
+text = "Not ready"
+when = { topic = "/ready", type = "std_msgs/msg/Bool", equals = false }
+"""
 ZENOH: Final = shipped_path("zenoh.json5")
 
 
@@ -88,6 +99,14 @@ def test_a_panel_with_a_story_lists_what_its_robot_can_play() -> None:
     assert robots.suggestions("topics", "/boxes", panel) is not None
     assert robots.suggestions("topics", "/none", panel) is None
     assert [row.name for row in robots.rows(panel)["topics"] if row.used] == []
+
+
+def test_topic_of_an_alarms_condition_is_used(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text(WITH_ALARM)
+    panel = load_panel(file)
+    used = uses_of(panel)["topics", "/ready"]
+    assert [render(place, "en") for place in used] == ["alarm"]
 
 
 async def _nowhere() -> Place | None:

@@ -136,6 +136,22 @@ def test_save_writes_the_changed_line_only(editor: EditorServer) -> None:
     assert "−" not in editor.part("diff")
 
 
+def test_a_saved_file_has_the_commands_that_serve_it(editor: EditorServer) -> None:
+    def commands() -> list[str]:
+        return re.findall(r"<code>(.*?)</code>", editor.part("diff"))
+
+    run = f"operator-panel run {editor.file}"
+    assert 'data-part="outline"' in editor.http.get("/").text
+    assert commands() == [run, f"KIOSK_MODE=demo {run}"]  # its robot is real, and simulated here
+    editor.edit({"op": "set", "path": ["mode"], "value": "demo"}).raise_for_status()
+    assert commands() == []
+    editor.http.post("/save", json={}).raise_for_status()
+    assert commands() == [run]
+    editor.edit({"op": "set", "path": ["mode"], "value": "none"}).raise_for_status()
+    editor.http.post("/save", json={}).raise_for_status()
+    assert commands() == []  # the panel server does not start with a fault
+
+
 def test_what_others_write_is_merged_where_it_is_another_table(editor: EditorServer) -> None:
     editor.edit({"op": "set", "path": LABEL, "value": "Belt speed"}).raise_for_status()
     editor.file.write_text(PANEL.replace("Gripper", "Claw"))
@@ -143,6 +159,16 @@ def test_what_others_write_is_merged_where_it_is_another_table(editor: EditorSer
     editor.http.post("/save", json={}).raise_for_status()
     both = PANEL.replace("Gripper", "Claw").replace('label = "Speed" ', 'label = "Belt speed" ')
     assert editor.file.read_text() == both
+
+
+def test_a_half_written_file_is_taken_when_it_is_whole(editor: EditorServer) -> None:
+    editor.edit({"op": "set", "path": LABEL, "value": "Belt speed"}).raise_for_status()
+    editor.file.write_text("")
+    until(lambda: editor.state()["conflicts"], "the half of it is a conflict")
+    editor.file.write_text(PANEL.replace("Gripper", "Claw"))
+    until(lambda: "Claw" in editor.http.get("/text").text, "the whole is taken")
+    assert editor.state()["conflicts"] == 0
+    assert 'label = "Belt speed"' in editor.http.get("/text").text
 
 
 def test_what_both_have_changed_is_chosen(editor: EditorServer) -> None:
@@ -330,6 +356,8 @@ def test_a_file_that_is_not_there_is_begun_with_a_page(tmp_path: Path) -> None:
             text = editor.http.get("/text").text
             assert text.startswith('title = "Robot cell"\n')
             assert editor.http.get("/preview/").status_code == 200
+            assert 'data-part="parts"' in editor.http.get("/").text  # what can be added
+            assert "operator-panel run" not in editor.part("diff")
         finally:
             editor.end()
 

@@ -153,6 +153,21 @@ def test_what_another_program_writes_is_merged_or_named(
     assert any(backup.read_text() == changed(theirs) for backup in session.backups())
 
 
+def test_a_half_written_file_leaves_no_conflict(file: Path, opened: Open) -> None:
+    session = opened(file)
+    session.apply([GO], "go")
+    for whole in (changed(SetValue((*STOP, "label"), "Halt")), changed(GO)):
+        file.write_text("")
+        with pytest.raises(SaveConflict):
+            session.merge_from_disk()
+        assert not session.has_old_conflicts
+        file.write_text(whole)
+        assert session.has_old_conflicts
+        session.merge_from_disk()
+        assert session.conflicts == ()
+    assert session.document.text == changed(GO)
+
+
 def test_a_conflict_is_resolved_by_the_other_side_or_another_text(file: Path, opened: Open) -> None:
     session = opened(file)
     session.apply([GO], "go")
