@@ -87,7 +87,8 @@ def test_the_templates_of_the_wheel_are_compiled(
     assert len(names) > len(KINDS)
     assert {environment.get_template(name).name for name in names} == {*names}
     monkeypatch.undo()
-    context = {"widget": {"id": "a", "kind": "label", "label": "<A>"}}
+    context = {"widget": {"id": "a", "kind": "label", "label": "<A>"}, "why": "Not kept"}
     rendered = compiled_ones.render("_failed.html", "ja", **context)
     assert "&lt;A&gt;" in rendered
+    assert "Not kept" in rendered
     assert rendered == from_source.render("_failed.html", "ja", **context)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 from app.cell.alarms.shown import AlarmRow
 from app.cell.commands.diagnostic_acts import Doctor, NoDoctor
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     from app.cell.session.machine_watch import MachineWatch
     from app.cell.session.maps import MapPictures
     from app.cell.session.place_file import SavedPlaceFile
-    from app.cell.session.stop_views import StopViews
     from app.cell.stops.changes import ChangeJournal
 
 log = logging.getLogger("kiosk.fleet")
@@ -145,6 +144,16 @@ def _has_received(robot: RobotState, other: RobotState | None) -> bool:
     )
 
 
+class KeptViews(Protocol):
+    """Keeps what the pages of each robot show at its stops."""
+
+    async def now(self, session: RobotSession) -> bytes:
+        """What the pages of a robot show now, as it is kept; LogError if it is too large."""
+
+    async def stop(self) -> None:
+        """Waits for what is being written."""
+
+
 def _nothing() -> None:
     """For a fleet that is only shown."""
 
@@ -196,7 +205,7 @@ class Fleet:
         self.states: Path | None = None  # the file of the machine's states
         self.forward: ForwardProcess | None = None  # to the plant's central database
         self.machine: MachineWatch | None = None  # of a server that reaches robots
-        self.stop_views: StopViews | None = None  # of such a server, from some time after its start
+        self.stop_views: KeptViews | None = None  # of such a server, from some time after its start
         server = ServerParts(
             panel,
             revision,

@@ -237,12 +237,12 @@ def _add_pages(
 ) -> None:
     """As they were shown at the stop, else as they are now."""
     robot = moment.robot or _robots(panel)[0]  # of an alarm of the panel itself the first one
-    found = shown_near(_data_folder(settings, panel), robot, moment.at)
-    parcel.left_out += found.faults
+    nearest = shown_near(_data_folder(settings, panel), robot, moment.at)
+    parcel.left_out += nearest.faults
     why = "what the pages showed at this moment was not kept"
-    if found.shown is not None:
+    if nearest.shown is not None:
         try:
-            _draw(parcel, settings, panel, found.shown, language, reach.taker, True)
+            _draw(parcel, settings, panel, nearest.shown, language, reach.taker, True)
             return
         except FAULTS as error:
             why = f"what the pages showed at the stop can't be drawn: {error}"

@@ -55,13 +55,13 @@ def stands_alone(
         packed = base64.b64encode(file.content).decode()
         return _SOURCE.sub(lambda _: f"data:{file.media_type};base64,{packed}", image[0], count=1)
 
-    def link(found: re.Match[str]) -> str:
-        if found[2].startswith("#"):
-            return found[0]
-        page = _PAGE.search(found[2])
-        if page is None or page[1] not in pages or found[2] != f"{base}{page[0]}":
-            return found[1]
-        return f'{found[1]} href="{page[1]}.html"'
+    def link(anchor: re.Match[str]) -> str:
+        if anchor[2].startswith("#"):
+            return anchor[0]
+        page = _PAGE.search(anchor[2])
+        if page is None or page[1] not in pages or anchor[2] != f"{base}{page[0]}":
+            return anchor[1]
+        return f'{anchor[1]} href="{page[1]}.html"'
 
     text = _SHEET.sub(sheet, _GONE.sub("", html))
     text = _LINK.sub(link, _PICTURE.sub(picture, text))

@@ -184,18 +184,18 @@ def test_a_damaged_file_is_named_and_another_one_is_read(
 ) -> None:
     write(tmp_path, small(at=AT))
     write(tmp_path, small(at=AT + 2.0, said="later"))
-    nearest = tmp_path / FOLDER / f"{round(AT * 1000)}.json.gz"
-    nearest.write_bytes(content)
-    found = shown_near(tmp_path, "", AT)
-    assert found.shown is not None
-    assert found.shown.at == AT + 2.0
-    ((name, said),) = found.faults
-    assert name == f"{FOLDER}/{nearest.name}"
+    file = tmp_path / FOLDER / f"{round(AT * 1000)}.json.gz"
+    file.write_bytes(content)
+    nearest = shown_near(tmp_path, "", AT)
+    assert nearest.shown is not None
+    assert nearest.shown.at == AT + 2.0
+    ((name, said),) = nearest.faults
+    assert name == f"{FOLDER}/{file.name}"
     assert why in said
 
 
 @pytest.mark.parametrize(
-    ("robot", "at", "found"),
+    ("robot", "at", "said"),
     [
         ("", AT, "one"),
         ("", AT + AFTER_S - 0.01, "one"),
@@ -207,12 +207,12 @@ def test_a_damaged_file_is_named_and_another_one_is_read(
     ],
 )
 def test_the_nearest_of_the_robot_is_found(
-    tmp_path: Path, robot: str, at: float, found: str | None
+    tmp_path: Path, robot: str, at: float, said: str | None
 ) -> None:
-    for said, when, name in (("one", AT, ""), ("later", AT + 97.0, ""), ("of left", AT, "left")):
-        write(tmp_path, small(at=when, robot=name, said=said))
+    for text, when, name in (("one", AT, ""), ("later", AT + 97.0, ""), ("of left", AT, "left")):
+        write(tmp_path, small(at=when, robot=name, said=text))
     shown = shown_near(tmp_path, robot, at).shown
-    assert (shown and shown.view["widgets"]["heard"]["text"]) == found
+    assert (shown and shown.view["widgets"]["heard"]["text"]) == said
 
 
 def test_without_a_folder_none_is_found(tmp_path: Path) -> None:
@@ -244,9 +244,9 @@ def test_links_are_not_followed(tmp_path: Path) -> None:
     secret.write_bytes(WHOLE)
     (tmp_path / FOLDER).mkdir()
     (tmp_path / FOLDER / f"{round(AT * 1000)}.json.gz").symlink_to(secret)
-    found = shown_near(tmp_path, "", AT)
-    assert found.shown is None
-    assert len(found.faults) == 1
+    nearest = shown_near(tmp_path, "", AT)
+    assert nearest.shown is None
+    assert len(nearest.faults) == 1
 
 
 def fails(*_: Any) -> None:
