@@ -71,9 +71,10 @@ BROWSER_WITHIN_S: Final = 5.0  # on a busy machine a page is drawn late
 ENDED_WITHIN_S: Final = 12.0  # a goal of the simulated robot
 BEATS_S: Final = 0.08
 HELD_S: Final = 0.3
-TRIES: Final = 3  # of a press that must be done
+TRIES: Final = 5  # of a press that must be done
 REFUSED: Final = "the server refuses it"
 ENDED: Final = "the server ended the hold"
+LATE: Final = frozenset({"hold_by_heartbeat", "hold_by_stall"})  # beats: codes of an end
 AGAIN: Final = (REFUSED, ENDED)  # begin faults after which an operator presses again
 RECIPE: Final = "proof"  # the id of the recipe that is loaded, of each set
 OTHER_TYPES: Final = ("std_msgs/msg/Int8", "std_msgs/msg/Float64")  # one of them differs
@@ -561,14 +562,14 @@ class _Round:
                 if not is_held(held := self._begin(socket, guarded)):
                     return f"{REFUSED}: {held.get('reason')}"
                 if ended := self._beat(socket, held, HELD_S):
-                    return ended
+                    return f"{ENDED}: {ended.get('reason')}"
             except ConnectionClosed as closed:
                 return f"{ENDED}: {closed}"
         return "" if self._robot.arrived[topic] > before else "nothing arrived at the robot"
 
-    def _beat(self, socket: ClientConnection, held: dict[str, Any], for_s: float) -> str:
+    def _beat(self, socket: ClientConnection, held: dict[str, Any], for_s: float) -> dict[str, Any]:
         """Holds for some time; `held` has the stamp of the last answer, and the number of the last
-        beat. Why the server has ended it; "" if it has not."""
+        beat. The receipt if the server has ended it, {} if it has not."""
         end = time.monotonic() + for_s
         while time.monotonic() < end:
             held["number"] = number = held.get("number", 0) + 1
@@ -576,10 +577,10 @@ class _Round:
             socket.send(json.dumps({**beat, "after": 1}))
             answer = json.loads(socket.recv(5))
             if not is_held(answer):
-                return f"{ENDED}: {answer.get('reason')}"
+                return dict(answer)
             held["stamp"] = answer["stamp"]
             time.sleep(BEATS_S)
-        return ""
+        return {}
 
     def _hold(self, guarded: Guarded, end: HoldEnd, interlock: Interlock | None) -> None:
         """A hold that ends in a way: how long until the last message has left."""
@@ -602,7 +603,7 @@ class _Round:
         if not is_held(held := self._begin(socket, guarded)):
             return f"{REFUSED}: {held.get('reason')}", None
         if ended := self._beat(socket, held, HELD_S):
-            return ended, None
+            return f"{ENDED}: {ended.get('reason')}", None
         began = time.monotonic()
         if end == "released":
             done = {"do": "end", "why": "released", "lease": held["lease"]}
@@ -616,7 +617,10 @@ class _Round:
             stays_until = began + 2 * STOPPED_WITHIN_S
             with suppress(ConnectionClosed):  # the finger stays on it
                 while time.monotonic() < stays_until:
-                    self._beat(socket, held, stays_until - time.monotonic())
+                    ended = self._beat(socket, held, stays_until - time.monotonic())
+                    if ended.get("code") in LATE:
+                        self._permit_others(guarded, interlock)
+                        return f"{ENDED}: {ended.get('reason')}", None
                     time.sleep(BEATS_S)
         return self._stopped(str(getattr(guarded.control, "topic", "")), began)
 

@@ -18,8 +18,8 @@ from app.panel import Panel, load_panel
 from app.tools.cli.prove import main
 from app.tools.prove import proof as proving
 from app.tools.prove.cases import plan_of
-from app.tools.prove.proof import AGAIN, ENDED, _Round, prove
-from app.tools.prove.result import Proof
+from app.tools.prove.proof import AGAIN, TRIES, _Round, is_held, prove
+from app.tools.prove.result import Proof, Result
 from app.tools.prove.rig import HOLDER, Rig
 from app.tools.prove.robot import ProvingRobots
 from app.tools.prove.steps import steps_of
@@ -118,7 +118,7 @@ def always(value: Any) -> Any:
 @pytest.mark.parametrize(("where", "name", "control", "at_first"), [
     ("_rig", "press", "horn", (409, {"outcome": "refused", "reason": "Just changed."})),
     ("", "_begin", "jog", {"state": "ended", "outcome": "refused", "reason": "Just changed."}),
-    ("", "_beat", "jog", f"{ENDED}: no signal from the browser."),
+    ("", "_beat", "jog", {"state": "ended", "code": "hold_by_heartbeat", "reason": "No signal."}),
 ])  # fmt: skip
 def test_a_press_that_is_refused_at_first_or_a_hold_that_ends_by_itself_is_tried_again(
     panel: Panel,
@@ -132,20 +132,47 @@ def test_a_press_that_is_refused_at_first_or_a_hold_that_ends_by_itself_is_tried
     plan = plan_of(panel)
     proving = _Round(panel, "", plan, folder=tmp_path, tell=lambda _: None, looks=False)
     owner = getattr(proving, where) if where else proving
-    does, times = getattr(owner, name), 0
+    does, times, is_refused_always = getattr(owner, name), 0, False
 
     def changed(*arguments: Any) -> Any:
         nonlocal times
         times += 1
-        return at_first if times in (1, 3, 4, 5) else does(*arguments)
+        return at_first if times == 1 or is_refused_always else does(*arguments)
 
     guarded = plan.controls[control]
     monkeypatch.setattr(owner, name, changed)
     with proving._rig:
         proving._permit_for(guarded, [*plan.interlocks.values()])
         assert proving._arrives(guarded) == ""
-        assert proving._arrives(guarded).startswith(AGAIN)  # it is refused each time
-    assert times == 5
+        is_refused_always, times = True, 0
+        assert proving._arrives(guarded).startswith(AGAIN)
+    assert times == TRIES
+
+
+def test_a_hold_that_ends_by_late_beats_before_its_interlock_forbids_is_tried_again(
+    panel: Panel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, told = plan_of(panel), list[Result]()
+    proving = _Round(panel, "", plan, folder=tmp_path, tell=told.append, looks=False)
+    beat, times, begin, began = proving._beat, 0, proving._begin, list[bool]()
+
+    def late(*arguments: Any) -> dict[str, Any]:
+        nonlocal times
+        times += 1
+        end = {"code": "hold_by_heartbeat", "reason": "No signal."}
+        return end if times == 2 else beat(*arguments)
+
+    def counted(*arguments: Any) -> dict[str, Any]:
+        began.append(is_held(answer := begin(*arguments)))
+        return answer
+
+    monkeypatch.setattr(proving, "_begin", counted)
+    monkeypatch.setattr(proving, "_beat", late)
+    with proving._rig:
+        proving._permit_for(plan.controls["jog"], [*plan.interlocks.values()])
+        proving._hold(plan.controls["jog"], "forbids", plan.interlocks["guard"])
+    assert [(row.situation, row.fault) for row in told] == [("forbids", "")]
+    assert began.count(True) >= 2
 
 
 # Code that decides wrongly: (module or class, name, in its place).
