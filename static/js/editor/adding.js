@@ -88,7 +88,7 @@ function onPickKey(event) {
   const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
   const picks = [...ask.querySelectorAll(".ways button")];
   if (!step || !picks.length) return;
-  const number = picks.findIndex((pick) => pick === document.activeElement);
+  const number = picks.findIndex((pick) => pick.matches(":focus"));
   picks[(number + step + picks.length) % picks.length].focus();
   event.preventDefault();
 }
