@@ -98,7 +98,7 @@ def as_bytes(shown: ShownView, most: int = MOST_BYTES) -> bytes:
 
 
 def from_bytes(data: bytes) -> ShownView:
-    """What is in the content of a file; ShownFault for what is no such content."""
+    """What is in the content of a file; ShownFault for anything else."""
     try:
         unpacker = zlib.decompressobj(wbits=PACKED)
         text = unpacker.decompress(data, 2 * MOST_BYTES)

@@ -22,8 +22,6 @@ KEPT_MOST: Final = 4_000  # samples of all recorded topics that are kept from on
 KEPT_BYTES: Final = 32_000_000  # and their bytes
 
 NO_KEYS: Final[frozenset[str]] = frozenset()
-
-
 NUMBERS: Final = 2**32  # a publisher's numbers begin again after as many messages
 
 
@@ -64,7 +62,7 @@ class Changes:
     """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
     `recorded_samples` has every sample of the recorded topics, and the changes of the changing ones.
     `caches` are (key, token) of the publishers that keep their last message for late subscribers,
-    `behind` those of which the last message was lost on its way.
+    `behind` those that have published more than has arrived.
     `reopen`: the session has to be opened again."""
 
     samples: dict[str, Sample]

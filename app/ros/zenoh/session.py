@@ -28,6 +28,7 @@ from app.ros.zenoh.config import (
 from app.ros.zenoh.declarations import NOTHING, Declarations
 from app.ros.zenoh.inbox import Changes, Inbox, Number
 from app.system.errors import LinkError
+from app.system.limits import Quota, TokenBuckets
 
 # Publishers of the Zenoh session: plain ones, and latched ones, which keep their last message.
 
@@ -161,6 +162,7 @@ log = logging.getLogger("kiosk.link")
 
 ASK_TIMEOUT_S = 2.0
 POLL_S = 0.02
+LOSSES: Final = Quota(1, per_s=1 / 60)  # of a topic that are in the log
 NUMBER_BYTES: Final = 4  # of the number of a publisher's last message
 NOT_READ = b""  # in place of a payload: it is of no type, so what needs it locks
 OnPayload = Callable[[Any], None]
@@ -187,6 +189,7 @@ class ZenohSession:
         self._on_demand: dict[str, tuple[str, OnPayload]] = {}  # key → key expression, callback
         self._demanded: dict[str, zenoh.Subscriber[None]] = {}
         self._numbered: dict[str, zenoh.Subscriber[None]] = {}  # by key: to the numbers of its messages
+        self._losses = TokenBuckets(LOSSES)
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._open()
 
@@ -454,7 +457,11 @@ class ZenohSession:
                 self._hear_numbers(key)
             self._ask_cache(key, token)
         for key, token in changes.behind:
-            log.warning("a message of %s was lost on its way: its publisher is asked for it", key)
+            if self._losses.has_token(key):
+                self._losses.take_token(key)
+                log.warning(
+                    "more was published on %s than has arrived: the last message is asked for", key
+                )
             self._ask_cache(key, token)
         return changes
 

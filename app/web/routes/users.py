@@ -211,7 +211,7 @@ def _sessions_json(
 async def own_sessions(
     request: Request, state: CurrentState, query: Annotated[SessionsQuery, Query()]
 ) -> Response:
-    """Nobody sees those of others here."""
+    """No one but their user sees them here."""
     who = caller_of(request).principal
     own = state.access.own_sessions(who)
     if not caller_of(request).accepts_html:

@@ -114,13 +114,13 @@ NEXT: Final[dict[str, tuple[Any, Callable[[Fleet], None], Any]]] = {
 def test_stops_of_two_robots_are_asked_together_only_before_the_shift_ends() -> None:
     async def scene() -> None:
         fleet = fleet_of(2)
-        for before_s, told in ((3_600.0, ["right"]), (600.0, ["left", "right"])):
+        for before_s, asked_of in ((3_600.0, ["right"]), (600.0, ["left", "right"])):
             fleet.alarms.ask(None)
             for robot in ("left", "right"):
                 ask_reason(fleet, robot, ENDS - before_s - 90.0, ENDS - before_s)
             asked = fleet.alarms.asked
             assert asked
-            assert [stop["robot"] for stop in asked["stops"]] == told
+            assert [stop["robot"] for stop in asked["stops"]] == asked_of
         await fleet.stop()
 
     asyncio.run(scene())
@@ -136,8 +136,8 @@ def test_the_question_changes(case: str) -> None:
         fleet.alarms.ask(asked_together(fleet.panel.robot_names, stops, ENDS))
         act(fleet)
         asked = fleet.alarms.asked
-        told = asked and [(stop["robot"], stop["began"]) for stop in asked["stops"]]
-        assert told == after
+        named = asked and [(stop["robot"], stop["began"]) for stop in asked["stops"]]
+        assert named == after
         await fleet.stop()
 
     asyncio.run(scene())

@@ -152,8 +152,8 @@ def test_a_press_that_is_refused_at_first_or_a_hold_that_ends_by_itself_is_tried
 def test_a_hold_that_ends_by_late_beats_before_its_interlock_forbids_is_tried_again(
     panel: Panel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan, told = plan_of(panel), list[Result]()
-    proving = _Round(panel, "", plan, folder=tmp_path, tell=told.append, looks=False)
+    plan, results = plan_of(panel), list[Result]()
+    proving = _Round(panel, "", plan, folder=tmp_path, tell=results.append, looks=False)
     beat, times, begin, began = proving._beat, 0, proving._begin, list[bool]()
 
     def late(*arguments: Any) -> dict[str, Any]:
@@ -171,7 +171,7 @@ def test_a_hold_that_ends_by_late_beats_before_its_interlock_forbids_is_tried_ag
     with proving._rig:
         proving._permit_for(plan.controls["jog"], [*plan.interlocks.values()])
         proving._hold(plan.controls["jog"], "forbids", plan.interlocks["guard"])
-    assert [(row.situation, row.fault) for row in told] == [("forbids", "")]
+    assert [(row.situation, row.fault) for row in results] == [("forbids", "")]
     assert began.count(True) >= 2
 
 
