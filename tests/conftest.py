@@ -77,6 +77,12 @@ def pytest_pycollect_makemodule(module_path: Path) -> None:
         form.load_hypothesis_profile()
 
 
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Bytes are not shown in a test's name: packed ones differ from second to second, and the workers
+    would collect different tests."""
+    return argname if isinstance(val, bytes | bytearray) else None
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leaves out the tests of other tiers, and those with a browser if there is none. Repeats failed
     tests of real time once, and no others. Sorts the files: first those with a browser, which share it

@@ -1,5 +1,6 @@
 """Which command runs a test, and what `make test` sets up for the tests that ARGS name."""
 
+import os
 import subprocess
 import sys
 
@@ -65,3 +66,10 @@ def test_every_promise_has_a_test_and_the_table_of_contributing_names_it() -> No
     assert done.stdout in (ROOT / "CONTRIBUTING.md").read_text(), (
         "python -m tests.tiers --promises CONTRIBUTING.md"
     )
+
+
+@pytest.mark.parametrize("content", [os.urandom(8), b"", bytearray(os.urandom(8))])
+def test_workers_collect_the_same_tests_with_different_bytes(
+    content: bytes, request: pytest.FixtureRequest
+) -> None:
+    assert request.node.name.split("[")[1].rstrip("]") in {"content0", "content1", "content2"}, content
