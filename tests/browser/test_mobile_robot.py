@@ -136,3 +136,63 @@ def test_symbols_of_places_stay_while_the_robot_drives(shuttle: Server, page: Pa
     assert symbol.evaluate("(symbol) => symbol.isFirst")
     widget(page, "send").locator(".cancel").click()
     expect(widget(page, "send")).to_contain_text("Canceled at")
+
+
+# What is cut of the texts on a button.
+CUT: Final = """(face) => [...face.querySelectorAll(":scope > :is(.label, p)")]
+  .filter((text) => text.checkVisibility() && text.textContent.trim())
+  .filter((text) => {
+    const [box, within] = [text.getBoundingClientRect(), face.getBoundingClientRect()];
+    return box.height < parseFloat(getComputedStyle(text).fontSize)
+      || box.top < within.top || box.bottom > within.bottom;
+  })
+  .map((text) => text.className)"""
+
+
+def test_locked_button_on_a_low_screen_has_its_whole_name_and_reason_beside_a_result(
+    shuttle: Server, page: Page
+) -> None:
+    opened(page, shuttle)
+    send(page, "palletizer_1")
+    widget(page, "send").locator(".cancel").click()
+    expect(widget(page, "send")).to_contain_text("Canceled at")
+    page.set_viewport_size({"width": 800, "height": 480})
+    page.get_by_text("Places", exact=True).first.click()
+    face = widget(page, "send").locator(".face").first
+    expect(face.locator(".result")).to_be_visible()
+    assert face.evaluate(CUT) == []
+    by_hand(page, shuttle, "on")
+    opened(page, shuttle)
+    page.get_by_text("Places", exact=True).first.click()
+    expect(face.locator(".why")).to_contain_text("Driven by hand.")
+    expect(face.locator(".why")).to_be_visible()
+    assert face.evaluate(CUT) == []
+    by_hand(page, shuttle, "off")
+
+
+def by_hand(page: Page, server: Server, position: str) -> None:
+    page.goto(f"{server.url}/pages/drive")
+    page.get_by_text("Manual drive", exact=True).first.click()
+    switch = widget(page, "by_hand").locator(f"[data-position={position}]")
+    switch.click()
+    expect(switch).to_have_attribute("aria-pressed", "true")
+
+
+def test_all_places_are_wholly_seen_on_a_small_screen(shuttle: Server, page: Page) -> None:
+    page.set_viewport_size({"width": 1024, "height": 600})
+    opened(page, shuttle)
+    places = widget(page, "goal").locator(".places")
+    box, last = place(places), place(places.locator("button").last)
+    assert last["y"] + last["height"] <= box["y"] + box["height"]
+
+
+def test_phone_scrolls_a_page_that_fits_and_shows_its_lists_and_pictures_whole(
+    shuttle: Server, page: Page
+) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    opened(page, shuttle)
+    assert place(widget(page, "goal").locator(".places"))["height"] > 200
+    keys = [place(key)["y"] for key in widget(page, "hall").locator(".map-keys > button").all()]
+    assert len(set(keys)) == 1
+    page.goto(f"{shuttle.url}/pages/drive")
+    assert place(widget(page, "front"))["height"] >= 150

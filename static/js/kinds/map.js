@@ -13,7 +13,7 @@ const STEP = 1.5; // of the size, by a key
 const PAN = 0.2; // of the view, by an arrow key
 const MARGIN = 0.04; // of the view, around the whole map
 const MOST_PX_PER_CELL = 24;
-const SCALE_PX = 140; // at most
+const SCALE_PX = 140; // at most, and a quarter of the map
 const AGAIN_MS = 3000; // until tiles that did not come are asked for again
 const MOST_LAYERS = 8;
 
@@ -324,7 +324,8 @@ export class MapView {
   #drawScale() {
     const scale = find(this.#root, ".map-scale");
     const texts = [...scale.querySelectorAll("span")];
-    const fitting = texts.filter(({ dataset }) => Number(dataset.metres) * this.#perMetre <= SCALE_PX);
+    const most = Math.min(SCALE_PX, this.#view.clientWidth / 4);
+    const fitting = texts.filter(({ dataset }) => Number(dataset.metres) * this.#perMetre <= most);
     const shown = fitting[fitting.length - 1] ?? texts[0];
     for (const text of texts) text.hidden = text !== shown;
     scale.style.width = `${Number(shown.dataset.metres) * this.#perMetre}px`;
