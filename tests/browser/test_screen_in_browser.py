@@ -11,7 +11,7 @@ from playwright.sync_api import CDPSession, Locator, Page, expect
 from app.system.texts import sentences
 from tests.browser.test_layout_in_browser import PANEL
 from tests.support.browser.browsers import sized
-from tests.support.browser.pages import DRAWN, place, settled
+from tests.support.browser.pages import DRAWN, place, settled, squeezed
 from tests.support.panel_text import MAIN, START
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server, ready
@@ -217,6 +217,13 @@ def test_a_phone_shows_the_pages_that_have_no_widgets(cell: Server, page: Page, 
     assert page.locator("main .group").locator("visible=true").count() > 0
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     assert page.locator("main").inner_text().strip()
+
+
+@pytest.mark.parametrize("page_id", ["cell", "operation", "recipe", "robot", "watch"])
+def test_what_a_phone_shows_has_room(cell: Server, page: Page, page_id: str) -> None:
+    sized(page, 390, 844).goto(f"{cell.url}/pages/{page_id}")
+    page.evaluate(DRAWN)
+    assert squeezed(page) == []
 
 
 def test_a_phone_only_shows(cell: Server, page: Page) -> None:

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from app.system.settings import panel_path
 from tests.browser.test_accessibility import violations
-from tests.support.browser.pages import place, widget
+from tests.support.browser.pages import DRAWN, place, squeezed, widget
 from tests.support.parts import ROOT, Server, until
 from tests.support.servers import ready
 
@@ -114,3 +114,21 @@ def test_without_scripts_the_tour_is_a_list_and_is_sent(shuttle: Server, page: P
     assert shuttle.http.post("/widgets/drive_round/cancel", json={}).status_code == 200
     until(lambda: not shuttle.widget("drive_round")["busy"], "it is canceled")
     context.close()
+
+
+@pytest.mark.parametrize("page_id", ["map", "tour", "drive", "status"])
+def test_what_a_phone_shows_has_room(shuttle: Server, touchscreen: Page, page_id: str) -> None:
+    touchscreen.set_viewport_size({"width": 390, "height": 844})
+    touchscreen.goto(f"{shuttle.url}/pages/{page_id}")
+    touchscreen.evaluate(DRAWN)
+    assert squeezed(touchscreen) == []
+
+
+def test_a_phone_shows_the_tour_and_nothing_to_press(shuttle: Server, touchscreen: Page) -> None:
+    touchscreen.set_viewport_size({"width": 390, "height": 844})
+    touchscreen.goto(f"{shuttle.url}/pages/tour")
+    for row in rows(touchscreen).all():
+        expect(row).to_be_visible()
+    expect(widget(touchscreen, "hall_of_tour")).to_be_visible()
+    expect(widget(touchscreen, "drive_round")).to_be_hidden()
+    assert violations(touchscreen) == []

@@ -1,5 +1,7 @@
 """The table of widget kinds: each kind has all its parts, and one that lacks a part is named."""
 
+from typing import Final
+
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
@@ -25,6 +27,16 @@ def test_a_kind_has_a_macro_of_its_name(kind: str) -> None:
     environment = Environment(loader=FileSystemLoader(shipped_path("templates")))
     macro = getattr(environment.get_template(f"widgets/{kind}.html").module, kind)
     assert macro.arguments == ("widget", "shown", "inputs", "receipt", "words")
+
+
+# What a phone has though a value is entered in it: there it only shows.
+SHOWS_TOO: Final = {"parameter", "place", "tour"}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_phone_has_each_kind_that_shows_and_none_that_acts(kind: str) -> None:
+    acts = issubclass(KINDS[kind].model, Command | EntryWidget) or kind == "link"
+    assert KINDS[kind].model.on_phone == (not acts or kind in SHOWS_TOO)
 
 
 @pytest.fixture(scope="module")

@@ -346,6 +346,8 @@ PictureName = Annotated[str, Field(pattern=PICTURE)]
 class Static(BaseWidget):
     """A widget that never changes."""
 
+    on_phone: ClassVar[bool] = True
+
 
 class TextLabel(Static):
     """A text; its `label` is what it says."""
@@ -366,6 +368,8 @@ class Picture(Static):
 
 class PageLink(Static):
     """A key that opens another page of the panel."""
+
+    on_phone: ClassVar[bool] = False  # its tabs open pages
 
     kind: Literal["link"]
     page: Id

@@ -97,6 +97,7 @@ class BaseWidget(RobotKey):
     why_needed: ClassVar[Mapping[str, str]] = {}  # why a key is required, if that is not obvious
     required_types: ClassVar[tuple[str, ...]] = ()  # that the server needs for this kind
     allowed_in_frame: ClassVar[bool] = False  # whether the frame around the pages may have it
+    on_phone: ClassVar[bool] = False  # whether a phone has it, which only shows
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         """Faults of a widget whose keys and types are valid; `place` is its place in the panel file."""
@@ -176,6 +177,7 @@ class TopicField(AgeKey, FieldKeys):
 class DisplayWidget(BaseWidget):
     """A widget that shows what topics say, of one robot, or what to do about alarms."""
 
+    on_phone: ClassVar[bool] = True
     shows_alarms: ClassVar[bool] = False
 
     @abstractmethod

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -96,6 +96,8 @@ class Option(Description):
 class SelectInput(DisplayWidget, Input):
     """Its options are those of the panel file, or with `options_from` the robot's: texts, or whole
     numbers."""
+
+    on_phone: ClassVar[bool] = False
 
     kind: Literal["select"]
     span: Span = 6

@@ -61,6 +61,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
     It is an input too: a press sets the value that it has under the widget's id.
     """
 
+    on_phone: ClassVar[bool] = True
     kind: Literal["parameter"]
     node: NodeName
     parameter: ParameterName

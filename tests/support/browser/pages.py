@@ -113,3 +113,17 @@ def middle(element: Locator) -> tuple[float, float]:
     """The middle of a visible element, in px of the window."""
     box = place(element)
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+SQUEEZED: Final = """() => [...document.querySelectorAll("main .cell *")]
+    .filter((part) => part instanceof HTMLElement && part.checkVisibility())
+    .filter((part) => getComputedStyle(part).overflowY !== "visible")
+    .filter((part) => part.clientHeight > 1 || getComputedStyle(part).clipPath === "none")
+    .filter((part) => part.scrollHeight > part.clientHeight + 4 && part.clientHeight < 100)
+    .map((part) => `${part.closest(".cell").id} ${part.tagName} ${part.className}`)"""
+
+
+def squeezed(page: Page) -> list[str]:
+    """What scrolls within less than 100 px: lists of widgets that have no room. Not what is only read
+    aloud."""
+    return list(page.evaluate(SQUEEZED))
