@@ -1,7 +1,5 @@
 """What openapi.json says is what the server does: held against it by hand, and by Schemathesis."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,13 +10,15 @@ import pytest
 from app.web.requests import FORM
 from app.web.server import HEAD_MOST
 from tests.support.form import LONG, several
+from tests.support.fuzzed import fuzzed
 from tests.support.parts import REFERENCE, ROOT, Server
 from tests.support.servers import ready
 
 CONTROL = "\n[control]\nrequired = true\n"
 EXAMPLES = several(3, 20)  # of each operation
-# The other phases try every limit of the description: that takes three quarters of the time.
-PHASES = "examples,coverage,fuzzing,stateful" if LONG else "fuzzing"
+# Each a test of its own: all together take longer than a test may. The others try every limit of the
+# description: that takes three quarters of the time.
+PHASES = ("examples,coverage", "fuzzing", "stateful") if LONG else ("fuzzing",)
 SEED = "20261122"
 
 
@@ -153,27 +153,21 @@ def test_the_longest_return_of_a_provider_is_no_request_too_long(described: dict
 
 
 @pytest.mark.long("random")
-def test_schemathesis_finds_nothing(kiosk: Server, described: dict[str, Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize("phases", PHASES)
+def test_schemathesis_finds_nothing(
+    kiosk: Server, described: dict[str, Any], phases: str, tmp_path: Path
+) -> None:
     """All of its checks, on everything but the stream that never ends."""
-    done = subprocess.run(
-        [
-            str(Path(sys.executable).with_name("schemathesis")),
-            "run",
-            f"{kiosk.url}/openapi.json",
-            "--checks=all",
-            "--exclude-path-regex=/events$",
-            f"--max-examples={EXAMPLES}",
-            f"--phases={PHASES}",
-            f"--seed={SEED}",
-        ],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
+    printed = fuzzed(
+        f"{kiosk.url}/openapi.json",
+        tmp_path,
+        "--checks=all",
+        "--exclude-path-regex=/events$",
+        f"--max-examples={EXAMPLES}",
+        f"--phases={phases}",
+        f"--seed={SEED}",
     )
-    assert done.returncode == 0, done.stdout
     operations = [path for path, methods in described["paths"].items() for _ in methods]
     tried = [path for path in operations if not path.endswith("/events")]
-    assert f"Selected: {len(tried)}/{len(operations)}" in done.stdout
+    assert f"Selected: {len(tried)}/{len(operations)}" in printed
     assert "Traceback" not in kiosk.process.text

@@ -2,8 +2,6 @@
 server, and nothing done beyond the role. In the short form what is posted only."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +10,7 @@ import httpx
 import pytest
 
 from tests.support.form import LONG, several
+from tests.support.fuzzed import fuzzed
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 from tests.support.users import add_user, log_rows, token_of
@@ -76,28 +75,19 @@ def users(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Users]:
 def test_no_role_does_more_than_it_may(users: Users, role: str, tmp_path: Path) -> None:
     seen = len(users.rows())
     token = users.tokens.get(role)
-    done = subprocess.run(
-        [
-            str(Path(sys.executable).with_name("schemathesis")),
-            "run",
-            str(users.file),
-            f"--url={users.server.url}",
-            "--checks=not_a_server_error,status_code_conformance,content_type_conformance,"
-            "response_schema_conformance",
-            "--exclude-path-regex=/events$|/robots/",  # which this panel has one of
-            f"--max-examples={EXAMPLES}",
-            "--phases=fuzzing",
-            *([] if LONG else ["--include-method=POST"]),
-            f"--seed={SEED}",
-            *([f"--header=Authorization: Bearer {token}"] if token else []),
-        ],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
+    fuzzed(
+        str(users.file),
+        tmp_path,
+        f"--url={users.server.url}",
+        "--checks=not_a_server_error,status_code_conformance,content_type_conformance,"
+        "response_schema_conformance",
+        "--exclude-path-regex=/events$|/robots/",  # which this panel has one of
+        f"--max-examples={EXAMPLES}",
+        "--phases=fuzzing",
+        *([] if LONG else ["--include-method=POST"]),
+        f"--seed={SEED}",
+        *([f"--header=Authorization: Bearer {token}"] if token else []),
     )
-    assert done.returncode == 0, done.stdout
     assert "Traceback" not in users.server.process.text
     rows = users.rows()[seen:]
     done_by_it = {(row["action"], row["widget"]) for row in rows if row["outcome"] != "refused"}
