@@ -134,6 +134,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """The table of tiers, and why each repeated test failed at first."""
+    for report in terminalreporter.stats.get("rerun", ()):
+        terminalreporter.write_sep("_", f"repeated: {report.nodeid}")
+        report.toterminal(terminalreporter._tw)
     if config.getoption("--tiers"):
         session = terminalreporter._session
         assert session is not None

@@ -1,6 +1,6 @@
 """`python -m tests.long`: the tests of the tier `long`, then a soak and a quick benchmark.
 
-Writes docs/test-report.json (the commit, each step, what failed, what was repeated) and
+Writes docs/test-report.json (the commit, each step, what failed or was repeated and why) and
 docs/test-report.md. Exit status 1: something failed. `python -m tests.long --check`: exit status 1
 unless the report is green and of the current commit. A commit that changes only the report is the same.
 """
@@ -25,13 +25,16 @@ from tests.support.places import ROOT
 WORKERS: Final = os.environ.get("WORKERS", "4")
 IN_WORKERS: Final = ("-n", WORKERS, "--dist", "loadfile", "--no-loadscope-reorder")
 SOAK_S: Final = "300"
+REASON_MOST: Final = 200
 REPORTS: Final = ("docs/test-report.json", "docs/test-report.md")
 
 
 class Step(NamedTuple):
-    """A part of the run: its name on the report, its command and its environment."""
+    """A part of the run: its name and what it does, as the report says it, its command and its
+    environment."""
 
     name: str
+    text: str
     command: tuple[str, ...]
     env: Mapping[str, str]
 
@@ -39,41 +42,79 @@ class Step(NamedTuple):
 def steps(outcomes: Path) -> tuple[Step, ...]:
     # With "=": pytest takes a path after a space for a test, and looks for its options there.
     test = (sys.executable, "-m", "pytest", "--tier=long", f"--outcomes={outcomes}")
-    many = {"EXAMPLES": "long"}
+    make = ("make", "--no-print-directory")
     return (
-        Step("tests beside each other", (*test, "--alone=without", *IN_WORKERS), many),
-        Step("tests of real time, alone", (*test, "--alone=only"), {}),
-        Step(f"soak of {SOAK_S} s", (sys.executable, "-m", "tests.faults.soak"), {"SOAK_S": SOAK_S}),
-        Step("rivals, quick", ("make", "--no-print-directory", "bench-setup", "bench"), {"QUICK": "1"}),
+        Step(
+            "tests beside each other",
+            f"all but those of real time, in {WORKERS} processes, with many random inputs",
+            (*test, "--alone=without", *IN_WORKERS),
+            {"EXAMPLES": "long"},
+        ),
+        Step(
+            "tests of real time, alone",
+            "one after the other; one that fails is repeated once",
+            (*test, "--alone=only"),
+            {},
+        ),
+        Step(
+            f"soak of {SOAK_S} s",
+            "normal operation: no event lost, no press received twice",
+            (sys.executable, "-m", "tests.faults.soak"),
+            {"SOAK_S": SOAK_S},
+        ),
+        Step(
+            "rivals, installed",
+            "`make bench-setup`: builds the rivals that are not there yet",
+            (*make, "bench-setup"),
+            {},
+        ),
+        Step(
+            "rivals, quick",
+            "`QUICK=1 make bench`: each phase of the benchmark works with each rival",
+            (*make, "bench"),
+            {"QUICK": "1"},
+        ),
     )
 
 
 class Outcomes:
     """A plugin that appends a line of JSON to a file for each test: its id, whether it failed, whether
-    it was repeated, and its duration in seconds."""
+    it was repeated, the reason of each failure, and its duration in seconds."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._seconds: defaultdict[str, float] = defaultdict(float)
         self._repeated: set[str] = set()
         self._failed: set[str] = set()
+        self._reasons: defaultdict[str, list[str]] = defaultdict(list)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         test = report.nodeid
         self._seconds[test] += report.duration
-        if str(report.outcome) == "rerun":
+        repeated = str(report.outcome) == "rerun"
+        if repeated:
             self._repeated.add(test)
         elif report.failed:
             self._failed.add(test)
-        if report.when == "teardown" and str(report.outcome) != "rerun":
+        if repeated or report.failed:
+            self._reasons[test].append(failure(report))
+        if report.when == "teardown" and not repeated:
             row = {
                 "test": test,
                 "failed": test in self._failed,
                 "repeated": test in self._repeated,
+                "reasons": self._reasons[test],
                 "seconds": round(self._seconds[test], 1),
             }
             with self._path.open("a") as file:
                 file.write(json.dumps(row) + "\n")
+
+
+def failure(report: pytest.TestReport) -> str:
+    """Why a test failed, in one line without this checkout's path."""
+    crash = getattr(report.longrepr, "reprcrash", None)
+    lines = (crash.message if crash else report.longreprtext).strip().splitlines()
+    return lines[0].replace(f"{ROOT}/", "")[:REASON_MOST] if lines else ""
 
 
 def commit() -> str:
@@ -103,16 +144,17 @@ def run(outcomes: Path) -> dict[str, Any]:
         started = time.monotonic()
         status = subprocess.run(step.command, cwd=ROOT, env={**os.environ, **step.env}).returncode
         seconds = round(time.monotonic() - started)
-        done.append({"name": step.name, "status": status, "seconds": seconds})
-    tests = results(outcomes.read_text())
+        done.append({"name": step.name, "text": step.text, "status": status, "seconds": seconds})
+    tests = results(outcomes.read_text()) if outcomes.exists() else []
     return {
         "commit": commit(),
         "changed": changed_files(),
         "began": began.isoformat(timespec="seconds"),
+        "cores": os.cpu_count(),
         "steps": done,
         "tests": len(tests),
-        "failed": [row["test"] for row in tests if row["failed"]],
-        "repeated": [row["test"] for row in tests if row["repeated"]],
+        "failed": {row["test"]: row["reasons"] for row in tests if row["failed"]},
+        "repeated": {row["test"]: row["reasons"] for row in tests if row["repeated"]},
         "slowest": sorted(tests, key=lambda row: -row["seconds"])[:20],
     }
 
@@ -144,39 +186,63 @@ NO_RUN: Final = (
 
 def page(result: Mapping[str, Any]) -> str:
     """The report, as Markdown."""
+    began = datetime.fromisoformat(result["began"])
+    minutes = sum(step["seconds"] for step in result["steps"]) / 60
+    failed_steps = sum(bool(step["status"]) for step in result["steps"])
+    green = not (failed_steps or result["failed"] or result["changed"])
     lines = [
         TITLE,
         "",
-        f"The last run of `make test-long`, on {result['began'][:10]}, commit {result['commit'][:8]}:",
-        f"{result['tests']} tests, {len(result['failed'])} failed, {len(result['repeated'])} repeated.",
+        f"The last run of `make test-long` is **{'green' if green else 'red'}**."
+        + ("" if green else " `make release` needs a green one."),
         "",
-        *rows(("step", "exit status", "minutes")),
+        *rows(("", "")),
+        f"| commit | `{result['commit'][:8]}` |",
+        *([f"| changed since | {', '.join(result['changed'])} |"] if result["changed"] else []),
+        f"| began | {began:%d %B %Y, %H:%M} UTC |",
+        f"| took | {minutes:.0f} minutes, on {result['cores']} cores |",
+        f"| tests | {result['tests']:,}: {len(result['failed'])} failed, "
+        f"{len(result['repeated'])} repeated |",
+        "",
+        "## Steps",
+        "",
+        *rows(("step", "what ran", "exit status", "minutes")),
         *(
-            f"| {step['name']} | {step['status']} | {step['seconds'] / 60:.1f} |"
+            f"| {step['name']} | {step['text']} | {step['status']} | {step['seconds'] / 60:.1f} |"
             for step in result["steps"]
         ),
         "",
-        "A test of real time that fails is repeated once. Each repeat is here, also if it passed then.",
-        "",
         "## Failed",
         "",
-        *([f"- `{test}`" for test in result["failed"]] or ["None."]),
+        *with_reasons(result["failed"]),
         "",
         "## Repeated",
         "",
-        *([f"- `{test}`" for test in result["repeated"]] or ["None."]),
+        "Tests of real time that failed at first. Those that failed again are above, too.",
+        "",
+        *with_reasons(result["repeated"]),
         "",
         "## Slowest",
         "",
         *rows(("seconds", "test")),
         *(f"| {row['seconds']:.0f} | `{row['test']}` |" for row in result["slowest"]),
         "",
-        "## Why a test is here",
+        "## Why a test is in this tier",
         "",
         *rows(("reason", "what it says")),
         *(f"| {reason} | {text} |" for reason, text in tiers.REASONS.items()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def with_reasons(tests: Mapping[str, Sequence[str]]) -> list[str]:
+    """A list of tests, each with the reasons of its failures as they were printed."""
+    if not tests:
+        return ["None."]
+    lines = []
+    for test, reasons in tests.items():
+        lines += [f"- `{test}`", *(f"  - ``{reason}``" for reason in reasons)]
+    return lines
 
 
 def rows(names: Sequence[str]) -> tuple[str, str]:

@@ -15,10 +15,13 @@ GREEN: dict[str, Any] = {
     "commit": "c0ffee00",
     "changed": [],
     "began": "2026-05-04T08:00:00+00:00",
-    "steps": [{"name": "tests beside each other", "status": 0, "seconds": 60}],
+    "cores": 2,
+    "steps": [
+        {"name": "tests beside each other", "text": "in 4 processes", "status": 0, "seconds": 60}
+    ],
     "tests": 2,
-    "failed": [],
-    "repeated": ["tests/a.py::test_hold"],
+    "failed": {},
+    "repeated": {"tests/a.py::test_hold": ["AssertionError: it goes on"]},
     "slowest": [{"test": "tests/a.py::test_hold", "failed": False, "repeated": True, "seconds": 3.2}],
 }
 
@@ -32,7 +35,7 @@ def head(monkeypatch: pytest.MonkeyPatch) -> None:
     ("change", "fault"),
     [
         ({}, None),
-        ({"failed": ["tests/a.py::test_hold"]}, "tests/a.py::test_hold failed"),
+        ({"failed": {"tests/a.py::test_hold": []}}, "tests/a.py::test_hold failed"),
         ({"changed": ["app/main.py"]}, "files were changed since the commit: app/main.py"),
         ({"commit": "0ddba11000"}, "they are of commit 0ddba110, not of c0ffee00"),
         ({"steps": [{"name": "soak", "status": 2, "seconds": 1}]}, "soak: exit status 2"),
@@ -42,11 +45,24 @@ def test_a_release_needs_green_results_of_its_commit(change: dict[str, Any], fau
     assert long.faults(GREEN | change) == ([] if fault is None else [fault])
 
 
-def test_each_repeat_is_on_the_report() -> None:
+def test_each_repeat_is_on_the_report_with_its_reason() -> None:
     page = long.page(GREEN)
-    assert "2 tests, 0 failed, 1 repeated." in page
-    assert "## Repeated\n\n- `tests/a.py::test_hold`" in page
-    assert "| tests beside each other | 0 | 1.0 |" in page
+    assert "is **green**." in page
+    assert "| tests | 2: 0 failed, 1 repeated |" in page
+    assert "\n- `tests/a.py::test_hold`\n  - ``AssertionError: it goes on``\n" in page
+    assert "| tests beside each other | in 4 processes | 0 | 1.0 |" in page
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"failed": {"tests/a.py::test_hold": []}},
+        {"changed": ["app/main.py"]},
+        {"steps": [{"name": "soak", "text": "", "status": 2, "seconds": 1}]},
+    ],
+)
+def test_a_page_of_a_failed_run_is_red(change: dict[str, Any]) -> None:
+    assert "is **red**." in long.page(GREEN | change)
 
 
 def test_a_repeated_test_is_one_test() -> None:
