@@ -5,8 +5,10 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
+from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import Locator, Page, expect
 
 from app.panel.file.toml_lines import Path
@@ -16,6 +18,7 @@ from tests.support.editor import EditorServer, drag_line
 from tests.support.parts import until
 
 LISTS: Final = ("group", "widget")  # tables with forms of their own
+CLICKED_MS: Final = 2_000
 
 
 class Hands:
@@ -109,9 +112,7 @@ class Hands:
         entry = form.locator(f"[data-path='{_json_path(path)}']:not([data-sends=key], [data-by-edits])")
         table = form.locator(f'[id="{name}"]')
         group = form.locator(f'[aria-labelledby="{name}-name"]')
-        expect(entry.or_(table).or_(group).first).to_be_attached()
-        shown = next(each for each in (entry, table, group) if each.count()).first
-        self._open(shown)
+        shown = self._unfolded(entry, table, group)
         kind = shown.evaluate("e => e.localName + '.' + e.className + '.' + (e.dataset.sends ?? '')")
         if kind.startswith("select"):
             shown.select_option("" if value is None else _json(value))
@@ -145,11 +146,23 @@ class Hands:
     def _is(self, path: Path, value: Any) -> None:
         until(lambda: self.at(path) == value, f"{path} is {value!r}")
 
-    def _open(self, element: Locator) -> None:
-        """Opens what is folded around an element."""
-        folded = element.locator("xpath=ancestor::details[not(@open)]")
-        while folded.count():
-            self.click(folded.first.locator("xpath=summary"))
+    def _unfolded(self, *shapes: Locator) -> Locator:
+        """The shape in which the form shows a field, with what is folded around it opened. After an
+        edit the form comes again: then the field may have another shape, or a place that is open."""
+        shown: list[Locator] = []
+
+        def is_open() -> bool:
+            shown[:] = [shape.first for shape in shapes if shape.count()][:1]
+            folded = [each.locator("xpath=ancestor::details[not(@open)]").first for each in shown]
+            if not any(fold.count() for fold in folded):
+                return bool(shown)
+            with suppress(PlaywrightError):  # it is open, or elsewhere, at this moment
+                folded[0].locator("xpath=summary").click(timeout=CLICKED_MS)
+                self.actions += 1
+            return False
+
+        until(is_open, f"{shapes[0]} is in the form")
+        return shown[0]
 
     def _table(self, shown: Locator, path: Path, value: Any) -> None:
         if self.at(path) is None:
