@@ -309,7 +309,8 @@ export class Form {
     return this.#pane.querySelector("[data-form]")?.getAttribute("data-title");
   }
 
-  // Edits are posted one after the other. What is refused stands as it was typed, with the reason.
+  // Edits are posted one after the other; the pane is busy until the last of them is drawn. What is refused stands as
+  // it was typed, with the reason.
   /** @param {Edit[]} edits @param {HTMLElement} at */
   #post(edits, at) {
     const sent = isEntry(at) ? at.value : "";
@@ -336,7 +337,13 @@ export class Form {
       await this.refresh();
       return posted.ok;
     });
-    this.#last = posting.catch(() => undefined);
+    this.#pane.setAttribute("aria-busy", "true");
+    const last = posting
+      .catch(() => undefined)
+      .then(() => {
+        if (this.#last === last) this.#pane.removeAttribute("aria-busy");
+      });
+    this.#last = last;
     return posting;
   }
 

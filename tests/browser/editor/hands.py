@@ -5,10 +5,8 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any, Final
 
-from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import Locator, Page, expect
 
 from app.panel.file.toml_lines import Path
@@ -18,7 +16,6 @@ from tests.support.editor import EditorServer, drag_line
 from tests.support.parts import until
 
 LISTS: Final = ("group", "widget")  # tables with forms of their own
-CLICKED_MS: Final = 2_000
 
 
 class Hands:
@@ -108,11 +105,14 @@ class Hands:
         """Enters one key in the form that shows it."""
         if self.at(path) == value:
             return
+        self._drawn()
         name, form = element_id(path), self.page.locator("#form")
         entry = form.locator(f"[data-path='{_json_path(path)}']:not([data-sends=key], [data-by-edits])")
         table = form.locator(f'[id="{name}"]')
         group = form.locator(f'[aria-labelledby="{name}-name"]')
-        shown = self._unfolded(entry, table, group)
+        expect(entry.or_(table).or_(group).first).to_be_attached()
+        shown = next(each for each in (entry, table, group) if each.count()).first
+        self._open(shown)
         kind = shown.evaluate("e => e.localName + '.' + e.className + '.' + (e.dataset.sends ?? '')")
         if kind.startswith("select"):
             shown.select_option("" if value is None else _json(value))
@@ -136,33 +136,29 @@ class Hands:
     def _tick(self, shown: Locator, path: Path, wanted: list[Any]) -> None:
         """Ticks what is wanted; the order is that of the file's tables."""
         for each in {*wanted} ^ {*_listed(self.at(path))}:
+            self._drawn()
             shown.locator(f"input[value='{_json(each)}']").press("Space")
             self.actions += 1
         until(lambda: {*_listed(self.at(path))} == {*wanted}, f"{wanted} are ticked")
+        self._drawn()
+
+    def _drawn(self) -> None:
+        """Waits until the form is that of the last edit: until then fields change their places."""
+        expect(self.page.locator("#form")).not_to_have_attribute("aria-busy", "true")
 
     def _there(self, path: Path) -> None:
         until(lambda: self.at(path) is not None, f"{path} is added")
+        self._drawn()
 
     def _is(self, path: Path, value: Any) -> None:
         until(lambda: self.at(path) == value, f"{path} is {value!r}")
+        self._drawn()
 
-    def _unfolded(self, *shapes: Locator) -> Locator:
-        """The shape in which the form shows a field, with what is folded around it opened. After an
-        edit the form comes again: then the field may have another shape, or a place that is open."""
-        shown: list[Locator] = []
-
-        def is_open() -> bool:
-            shown[:] = [shape.first for shape in shapes if shape.count()][:1]
-            folded = [each.locator("xpath=ancestor::details[not(@open)]").first for each in shown]
-            if not any(fold.count() for fold in folded):
-                return bool(shown)
-            with suppress(PlaywrightError):  # it is open, or elsewhere, at this moment
-                folded[0].locator("xpath=summary").click(timeout=CLICKED_MS)
-                self.actions += 1
-            return False
-
-        until(is_open, f"{shapes[0]} is in the form")
-        return shown[0]
+    def _open(self, element: Locator) -> None:
+        """Opens what is folded around an element."""
+        folded = element.locator("xpath=ancestor::details[not(@open)]")
+        while folded.count():
+            self.click(folded.first.locator("xpath=summary"))
 
     def _table(self, shown: Locator, path: Path, value: Any) -> None:
         if self.at(path) is None:
