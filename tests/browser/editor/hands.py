@@ -134,13 +134,14 @@ class Hands:
         self._is(path, value)
 
     def _tick(self, shown: Locator, path: Path, wanted: list[Any]) -> None:
-        """Ticks what is wanted; the order is that of the file's tables."""
-        for each in {*wanted} ^ {*_listed(self.at(path))}:
-            self._drawn()
-            shown.locator(f"input[value='{_json(each)}']").press("Space")
-            self.actions += 1
+        """Takes back what is not wanted and ticks what is, in its order: what is ticked comes first."""
+        there = _listed(self.at(path))
+        for each in [*(each for each in there if each not in wanted), *wanted]:
+            if each not in there or each not in wanted:
+                shown.locator(f"input[value='{_json(each)}']").press("Space")
+                self.actions += 1
+                self._drawn()
         until(lambda: {*_listed(self.at(path))} == {*wanted}, f"{wanted} are ticked")
-        self._drawn()
 
     def _drawn(self) -> None:
         """Waits until the form is that of the last edit: until then fields change their places."""
