@@ -141,9 +141,12 @@ system:
 browser:
 	$(if $(ARGS),INSTALL=no )sh tests/system.sh browser
 
+# zenohd is a program without a library: cargo installs it, with its own lock, from what the workspace has built.
+ZENOH = $(shell sed -n 's/^zenoh-config = "=\(.*\)"/\1/p' tests/bridge_crate/Cargo.toml)
 bridge: system
-	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge and a node on hiroz for the tests: once, 5 to 10 minutes"
-	cargo build --release --locked --workspace --manifest-path tests/Cargo.toml --target-dir $(CACHE)/bridge
+	@[ -x $(CACHE)/bridge/bin/zenohd ] || echo "building the bridge, a node on hiroz and zenohd for the tests: once, 8 to 15 minutes"
+	cargo build --release --locked --config tests/profile.toml --workspace --manifest-path tests/Cargo.toml --target-dir $(CACHE)/bridge
+	cargo install --quiet --locked --config tests/profile.toml zenohd@$(ZENOH) --root $(CACHE)/bridge --target-dir $(CACHE)/bridge
 
 NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "the panel needs Python 3.11 or later, and this is %d.%d: make $(MAKECMDGOALS) PYTHON=python3.11" % sys.version_info[:2])'
 

@@ -5,7 +5,7 @@
 `wall`: the CPU time and memory of a wall with 100, 300 and 1,000 cells that change each second.
 `plant`: 3 routers, 10 panels with 5 robots each, a wall behind a cable that is slow, lossy and cut, in
 network namespaces; a router is killed. Needs root. The cable is a program (`tests/faults/wire.py`), as
-many kernels lack `tc netem`.
+many kernels lack `tc netem`. All routers are zenohd, as `make bridge` builds it for the tests.
 `robots`: 10, 25 and 50 robots, each a process with three topics at 10 Hz, on one server.
 """
 
@@ -23,13 +23,14 @@ import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from tests.faults.net import KIOSK_IP, ROBOT_IP, Cable
 from tests.support.cells import Cells, alarm
 from tests.support.parts import ROOT, free_port
-from tests.support.rmw import router_file
+from tests.support.rmw import router_file, zenohd
 
 QUICK: Final = bool(os.environ.get("QUICK"))
 MEASURED_S: Final = 5.0 if QUICK else 20.0
@@ -108,7 +109,7 @@ def ready(url: str) -> bool:
 
 
 def router(file: Path, before: Sequence[str] = ()) -> Program:
-    return Program(sys.executable, "-m", "tests.support.processes.rmw_router", str(file), before=before)
+    return Program(*zenohd("-c", str(file)), before=before)
 
 
 def zenoh_file(folder: Path, *endpoints: str) -> Path:
@@ -278,7 +279,7 @@ def measure_robots() -> None:
             port = free_port()
             panel_server = server(panel, folder, port)
             stack.callback(panel_server.end)
-            until(lambda port=port: ready(f"http://127.0.0.1:{port}"), "all robots are there")  # type: ignore[misc]
+            until(partial(ready, f"http://127.0.0.1:{port}"), "all robots are there")
             time.sleep(3)
             used, memory = cores(panel_server), panel_server.memory_mib
             print(f"  {count:3} robots: {used:6.1%} of a core, {memory:5.0f} MiB", flush=True)

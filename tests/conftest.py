@@ -23,7 +23,7 @@ from app.system.texts import ENGLISH, sentences
 from tests import tiers
 from tests.support import checkout, domains, form
 from tests.support.browser.drivers import OTHER_BROWSERS
-from tests.support.places import BRIDGE, CHROMIUM, HEADLESS, RMW_ROBOT, ROOT, ROS_PYTHON
+from tests.support.places import BRIDGE, CHROMIUM, HEADLESS, RMW_ROBOT, ROOT, ROS_PYTHON, ZENOHD
 
 if TYPE_CHECKING:
     import zenoh
@@ -38,7 +38,7 @@ sys.dont_write_bytecode = False
 
 # What a test of the browser, and one with other real parts, needs on this machine.
 BROWSER_FILES = (CHROMIUM, HEADLESS)
-ROBOT_FILES = (BRIDGE, RMW_ROBOT, ROS_PYTHON, *OTHER_BROWSERS)
+ROBOT_FILES = (BRIDGE, RMW_ROBOT, ZENOHD, ROS_PYTHON, *OTHER_BROWSERS)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -214,7 +214,13 @@ def hiroz() -> Path:
     return RMW_ROBOT
 
 
-# Tests that take one of these start programs of the system (`tests/system.sh`).
+# Tests that take one of these start programs: zenohd of the cache, the others of the system
+# (`tests/system.sh`).
+@pytest.fixture(scope="session")
+def zenohd() -> None:
+    """The Zenoh router as published: `Router` in `tests/support/rmw.py`."""
+
+
 @pytest.fixture(scope="session")
 def proxies() -> None:
     """nginx and Caddy."""

@@ -28,7 +28,7 @@ TIERS: Final[tuple[Tier, ...]] = get_args(Tier)
 # The fixtures for which a test belongs to `robot`.
 ROBOT_FIXTURES: Final = frozenset(
     {
-        *("domain", "cyclone_bridge", "own_cyclone_bridge", "cyclone_robots", "ros", "hiroz"),
+        *("domain", "cyclone_bridge", "own_cyclone_bridge", "cyclone_robots", "ros", "hiroz", "zenohd"),
         *("other_browser", "screens", "sway"),
         *("broker", "postgres", "proxies", "minisign", "systemd", "namespaces"),
     }

@@ -4,6 +4,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -89,6 +90,14 @@ class Presser:
             self.open_at = time.monotonic()
         return str(receipt["outcome"])
 
+    def is_open(self) -> bool:
+        """Presses once more."""
+        return self.press() == "published"
+
+    def arrived(self, robot: RosNode) -> bool:
+        """All that was published."""
+        return self.words("published") <= set(robot.heard_data("/operation"))
+
     def words(self, outcome: str) -> set[str]:
         return {word for word, each in self.receipts.items() if each["outcome"] == outcome}
 
@@ -100,7 +109,7 @@ def test_the_panel_changes_over_when_a_router_dies(
     until(lambda: panel.widget("say")["enabled"], "the permission comes through a router")
     for number, router in enumerate(routers.routers):
         presser = Presser(panel, f"router{number}")
-        until(lambda each=presser: each.press() == "published", "it is open")  # type: ignore[misc]
+        until(presser.is_open, "it is open")
         router.kill()
         killed_at = time.monotonic()
         while time.monotonic() - killed_at < CHANGE_OVER_S:
@@ -111,14 +120,10 @@ def test_the_panel_changes_over_when_a_router_dies(
         outcomes = Counter(str(each["outcome"]) for each in presser.receipts.values())
         print(f"router {number}: open after {took:.2f} s, {dict(outcomes)}, {refused}")
         assert presser.open_at, "it is open again"
-        until(lambda each=presser: each.words("published") <= said(robot), "all")  # type: ignore[misc]
+        until(partial(presser.arrived, robot), "all")
         heard = robot.heard_data("/operation")
         assert len(heard) == len(set(heard)), "no press arrives twice"
         assert not presser.words("refused") & set(heard), "what was refused was not sent later"
         assert set(outcomes) <= {"published", "refused", "unknown"}
         router.start()
         until(panel.ready, "it is there")
-
-
-def said(robot: RosNode) -> set[str]:
-    return set(robot.heard_data("/operation"))

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from tests.browser.test_accessibility import violations
 from tests.support.cells import Cells, alarm
 from tests.support.parts import Server, until
-from tests.support.rmw import Router
+from tests.support.rmw import Router, SessionRouter
 from tests.web.test_wall import tiles, wall_server
 
 TILE: Final = ".wall-tiles > a"
@@ -20,7 +20,7 @@ KINDS: Final = {"1-02": "fault", "1-07": "waiting", "2-04": "manual", "3-03": "w
 
 @pytest.fixture(scope="module")
 def router() -> Iterator[Router]:
-    mine = Router()
+    mine = SessionRouter()
     mine.start()
     yield mine
     mine.end()

@@ -1,7 +1,5 @@
 """The link to the robot fails during continuous presses: what is shown, and what arrives."""
 
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +14,8 @@ from tests.faults.rig import Rig, limit
 from tests.faults.trial import UNDER_WAY_S, presses_work, recorded, try_fault
 from tests.faults.watch import Watch, answering
 from tests.support.form import LONG, several
-from tests.support.parts import TESTS, Server, free_port, until
+from tests.support.parts import Server, until
+from tests.support.rmw import Router, router_file
 
 pytestmark = [pytest.mark.long("fault"), pytest.mark.promise("offline")]
 
@@ -86,30 +85,16 @@ def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) ->
 
 
 def test_a_router_between_is_killed(rig: Rig, tmp_path: Path) -> None:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    routers = []
-
-    def start() -> None:
-        command = [sys.executable, str(TESTS / "faults/router.py"), endpoint, rig.endpoint]
-        router = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        routers.append(router)
-        assert router.stdout is not None
-        assert router.stdout.readline() == "ready\n"
-
-    def kill() -> None:
-        routers[-1].kill()
-        routers[-1].wait()
-
-    start()
+    router = Router()
+    router.configure(router_file(tmp_path, "between", router.endpoint, [rig.endpoint]))
+    router.start()
     try:
-        with rig.serving(tmp_path, endpoint) as server:
-            trial = try_fault(rig, server, kill, start, locks_within_s=1.0, because=CUT_OFF)
+        with rig.serving(tmp_path, router.endpoint) as server:
+            trial = try_fault(
+                rig, server, router.kill, router.start, locks_within_s=1.0, because=CUT_OFF
+            )
     finally:
-        kill()
-        for router in routers:
-            for pipe in (router.stdin, router.stdout):
-                if pipe is not None:
-                    pipe.close()
+        router.end()
     recorded("Zenoh router between killed and started again", trial)
 
 

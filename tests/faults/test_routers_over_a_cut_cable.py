@@ -5,12 +5,13 @@ changes over when the lease is over. A robot at the other router is not locked."
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from tests.bridge.test_two_routers_on_bridge import PANEL, PAUSE_S, Presser, said
+from tests.bridge.test_two_routers_on_bridge import PANEL, PAUSE_S, Presser
 from tests.faults.net import Ring
 from tests.support.parts import ROOT, Bridge, RosNode, Server, client_file, free_port, until
 from tests.support.rmw import Router, router_file
@@ -90,7 +91,7 @@ def test_a_pulled_cable_locks_at_once_and_the_panel_changes_over(
         node = robot(domain + 4, stack, BETWEEN, f"tcp/127.0.0.1:{PORT}")
     server = panel(ring, stack, tmp_path)
     presser = Presser(server, "cut")
-    until(lambda: presser.press() == "published", "it is open")
+    until(presser.is_open, "it is open")
     before = set(presser.receipts)
     ring.cut()
     cut_at = time.monotonic()
@@ -110,7 +111,7 @@ def test_a_pulled_cable_locks_at_once_and_the_panel_changes_over(
     codes = [str(each["code"]) for each in others]
     assert codes[0] == "link_bridge_silent"
     assert "link_unreachable_at" in codes, "after the lease"
-    until(lambda: presser.words("published") <= said(node), "what was published has arrived")
+    until(partial(presser.arrived, node), "what was published has arrived")
     heard = node.heard_data("/operation")
     assert len(heard) == len(set(heard)), "no press arrives twice"
     assert not presser.words("refused") & set(heard), "what was refused was not sent later"
@@ -128,7 +129,7 @@ def test_a_pulled_cable_locks_no_robot_at_another_router(
     server = panel(ring, stack, tmp_path, ROBOTS.format(first=FIRST, second=SECOND))
     cut_off, other = (Presser(server.robot(name), name) for name in ("r1", "r2"))
     for presser in (cut_off, other):
-        until(lambda each=presser: each.press() == "published", "open")  # type: ignore[misc]
+        until(presser.is_open, "open")
     opened = len(other.receipts)
     ring.cut()
     cut_at = time.monotonic()
@@ -140,9 +141,9 @@ def test_a_pulled_cable_locks_no_robot_at_another_router(
         time.sleep(PAUSE_S)
     assert len(other.receipts) > opened
     ring.plug()
-    until(lambda: cut_off.press() == "published", "the first robot is there again")
+    until(cut_off.is_open, "the first robot is there again")
     for presser, node in zip((cut_off, other), nodes, strict=True):
-        until(lambda p=presser, n=node: p.words("published") <= said(n), "all")  # type: ignore[misc]
+        until(partial(presser.arrived, node), "all")
         heard = node.heard_data("/operation")
         assert len(heard) == len(set(heard))
         assert not presser.words("refused") & set(heard)

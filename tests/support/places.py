@@ -14,6 +14,7 @@ BRIDGE: Final = Path(
 )
 # A node on hiroz, beside the bridge: `tests/rmw_crate/`.
 RMW_ROBOT: Final = BRIDGE.with_name("test-rmw-robot")
+ZENOHD: Final = BRIDGE.parents[1] / "bin/zenohd"
 ROS_PYTHON: Final = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
 CHROMIUM: Final = "/usr/bin/chromium"
 # The same engine without windows: a page takes a quarter of the CPU time.

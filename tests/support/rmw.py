@@ -5,34 +5,81 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+import zenoh
+
+from app.tools.cell_config.rmw_zenoh_router import FOR_NODES
+from app.tools.cli.command import main as command
 from tests.support.parts import ORDERS, ROOT, Bridge, Process, RosNode, until
+from tests.support.places import ZENOHD
 from tests.support.processes.commanded import Commanded
 
+LISTENS: Final = "Listener added"  # in the log, once for each endpoint
+LOG: Final = "RUST_LOG=warn,zenoh::net::runtime::orchestrator=debug"
 OWN_ORDERS = {**ORDERS, "hold": ("token",)}
 
 
 class Router(Bridge):
-    """A Zenoh router in place of the bridge."""
+    """zenohd in place of the bridge, as users run it. A test that starts it takes `zenohd`, or another
+    fixture of a real part."""
 
     def __init__(self, domain: int = 0) -> None:
         super().__init__(domain)
 
     def start(self) -> None:
-        module = "tests.support.processes.rmw_router"
-        place = str(self._file or self.endpoint)
-        self._process = Process([sys.executable, "-m", module, place], {}, cwd=str(ROOT))
-        process = self._process
-        until(lambda: "running" in process.text or not process.running, "the router runs")
+        self._process = process = Process(self._command(), {}, cwd=str(ROOT))
+        ends = len(self._ends())
+        until(lambda: process.text.count(LISTENS) >= ends or not process.running, "the router listens")
         assert process.running, process.text
 
+    def _ends(self) -> Sequence[str]:
+        if self._file is None:
+            return [self.endpoint]
+        config = zenoh.Config.from_file(self._file)
+        return [*json.loads(config.get_json("listen/endpoints"))]
 
-def router_without_admin_space(folder: Path) -> Router:
-    """A router as it is without a configuration of rmw_zenoh's; it has not started."""
-    mine, file = Router(), folder / "router.json5"
+    def _command(self) -> Sequence[str]:
+        return ("setpriv", "--pdeathsig", "KILL", *zenohd(*self._configuration()))
+
+    def _configuration(self) -> list[str]:
+        if self._file is not None:
+            return ["-c", str(self._file)]
+        return ["--listen", self.endpoint, "--no-multicast-scouting"]
+
+
+def zenohd(*options: str) -> Sequence[str]:
+    """The command of a router that writes its log to stderr, without the panel's `ZENOH_RUNTIME`, which
+    its tests have inherited."""
+    environment = ("-u", "ZENOH_RUNTIME", "NO_COLOR=1", LOG)
+    return ("env", *environment, "sh", "-c", 'exec "$0" "$@" >&2', str(ZENOHD), *options)
+
+
+class SessionRouter(Router):
+    """A session of eclipse-zenoh in router mode, for the tests of `make test`: they need no Rust, and
+    there is no zenohd without. Its routing and links are those of zenohd, from the same source."""
+
+    def _command(self) -> Sequence[str]:
+        module = "tests.support.processes.session_router"
+        return (sys.executable, "-m", module, str(self._file or self.endpoint))
+
+
+def router_without_admin_space(folder: Path) -> SessionRouter:
+    """A router as it is without a configuration of rmw_zenoh's; it has not started. zenohd has an admin
+    space in any case."""
+    mine, file = SessionRouter(), folder / "router.json5"
     scouting = "scouting: { multicast: { enabled: false } }"
     file.write_text(f'{{ mode: "router", listen: {{ endpoints: ["{mine.endpoint}"] }}, {scouting} }}')
+    mine.configure(file)
+    return mine
+
+
+def configured_router(panel: Path, file: Path, door: str, *options: str) -> Router:
+    """A router with what `operator-panel router-config` writes: nodes come to its endpoint, the panel
+    to `door`. It has not started."""
+    mine = Router()
+    assert command(["router-config", str(panel), "--listen", door, *options, "-o", str(file)]) == 0
+    file.write_text(file.read_text().replace(FOR_NODES, mine.endpoint))
     mine.configure(file)
     return mine
 

@@ -13,7 +13,7 @@ import pytest
 from tests.cell.session.test_map_on_rmw_zenoh import GRID, POSE, TF, UPRIGHT, transform
 from tests.cell.session.test_rmw_zenoh import LATCHED
 from tests.support.parts import Server, until
-from tests.support.rmw import RmwNode, Router
+from tests.support.rmw import RmwNode, SessionRouter
 from tests.support.servers import live_server
 from tests.web.test_places import PANEL
 
@@ -86,7 +86,7 @@ def hidden(page: str) -> dict[str, str]:
 
 @pytest.fixture
 def shuttle(tmp_path: Path) -> Iterator[Shuttle]:
-    router = Router()
+    router = SessionRouter()
     router.start()
     node = RmwNode(router, "shuttle")
     try:

@@ -13,7 +13,7 @@ from app.cell.site.cells import MAX_CELLS, SILENT_S
 from app.ros.zenoh.site import alive_key
 from tests.support.cells import Cells, alarm, client_of
 from tests.support.parts import ROOT, Server, until
-from tests.support.rmw import Router
+from tests.support.rmw import Router, SessionRouter
 
 TILE: Final = re.compile(r'<a data-row="(c[0-9a-f]{10})"(?: data-is="(\w+)")?(.*?)</a>', re.DOTALL)
 
@@ -28,7 +28,7 @@ def wall_server(folder: Path, router: Router, sites: str = "*", **more: Any) -> 
 
 @pytest.fixture(scope="module")
 def router() -> Iterator[Router]:
-    mine = Router()
+    mine = SessionRouter()
     mine.start()
     yield mine
     mine.end()
@@ -220,7 +220,7 @@ def test_nothing_of_a_robot_is_there(wall: Server) -> None:
 
 
 def test_a_wall_without_a_router_says_so(tmp_path: Path) -> None:
-    gone = Router()
+    gone = SessionRouter()
     with wall_server(tmp_path, gone) as server:
         assert server.http.get("/readyz").json()["code"] == "wall_no_router"
         assert "No connection" in page(server)

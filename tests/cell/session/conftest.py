@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.support.rmw import Router
+from tests.support.rmw import Router, SessionRouter
 
 
 @pytest.fixture
 def router() -> Iterator[Router]:
-    mine = Router()
+    mine = SessionRouter()
     mine.start()
     yield mine
     mine.end()

@@ -64,6 +64,14 @@ PANEL = panel_of(MESSAGE, NUMBER, SAY, LAST, ADD, COUNT, SPEED)
 
 
 @pytest.fixture
+def router(zenohd: None) -> Iterator[Router]:
+    mine = Router()
+    mine.start()
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
 def robot(hiroz: Path, router: Router) -> Iterator[Process]:
     mine = Process([str(hiroz), router.endpoint], {})
     until(lambda: "running" in mine.text or not mine.running, "it runs")

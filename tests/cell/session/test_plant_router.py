@@ -55,7 +55,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def plant(folder: Path) -> Iterator[tuple[str, str]]:
+def plant(zenohd: None, folder: Path) -> Iterator[tuple[str, str]]:
     """The endpoints of two routers: the cells come to the first, walls to the second."""
     first, second = (f"tls/127.0.0.1:{free_port()}" for _ in range(2))
     cells = [f"--cell={folder}/cell1.toml", f"--cell={folder}/cell2.toml=cell2-kiosk"]

@@ -18,11 +18,10 @@ from app.cell.session.session import RobotSession
 from app.panel import load_panel
 from app.records import NullLog
 from app.ros.zenoh.config import config_to
-from app.tools.cli.command import main
 from tests.cell.session.test_rmw_zenoh import asked, enabled
 from tests.support.builders import press_widget
 from tests.support.parts import Process, until
-from tests.support.rmw import RmwNode, Router
+from tests.support.rmw import RmwNode, Router, configured_router
 from tests.support.waiting import when
 
 PANEL: Final = """
@@ -113,38 +112,35 @@ TOLD_OF_ALL: Final = {
 
 
 @pytest.fixture
-def file(panel: Path, door: str, tmp_path: Path) -> Path:
-    """What is written, with another port for the nodes."""
-    path = tmp_path / "router.json5"
-    assert main(["router-config", str(panel), "--listen", door, "-o", str(path)]) == 0
-    return path
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "router.json5"
 
 
 @pytest.fixture
-def router(file: Path) -> Iterator[Router]:
-    mine = Router()
-    file.write_text(file.read_text().replace("tcp/127.0.0.1:7447", mine.endpoint))
-    mine.configure(file)
-    mine.start()
+def stopped_router(zenohd: None, panel: Path, file: Path, door: str) -> Iterator[Router]:
+    """The configuration is in `file`."""
+    mine = configured_router(panel, file, door)
     yield mine
     mine.end()
 
 
 @pytest.fixture
-def telling_router(file: Path) -> Iterator[Router]:
+def router(stopped_router: Router) -> Router:
+    stopped_router.start()
+    return stopped_router
+
+
+@pytest.fixture
+def telling_router(stopped_router: Router, file: Path) -> Router:
     """The same, but it tells everyone of all subscribers and servers."""
-    mine, config = Router(), zenoh.Config.from_file(file)
+    config = zenoh.Config.from_file(file)
     access = json.loads(config.get_json("access_control"))
     access["rules"].append(TOLD_OF_ALL)
     access["policies"].append({"rules": ["told"], "subjects": ["panel"]})
-    endpoints = json.loads(config.get_json("listen/endpoints"))
-    config.insert_json5("listen/endpoints", json.dumps([mine.endpoint, *endpoints[1:]]))
     config.insert_json5("access_control", json.dumps(access))
     file.write_text(str(config))
-    mine.configure(file)
-    mine.start()
-    yield mine
-    mine.end()
+    stopped_router.start()
+    return stopped_router
 
 
 # Messages of a topic that come within 100 s of one are dropped, as where a connection is slow: neither
@@ -157,14 +153,11 @@ DROPPED: Final = {
 
 
 @pytest.fixture
-def dropping_router(file: Path) -> Iterator[Router]:
-    mine = Router()
-    text = file.read_text().replace("tcp/127.0.0.1:7447", mine.endpoint).rstrip().removesuffix("}")
+def dropping_router(stopped_router: Router, file: Path) -> Router:
+    text = file.read_text().rstrip().removesuffix("}")
     file.write_text(f"{text}  downsampling: [{json.dumps(DROPPED)}],\n}}\n")
-    mine.configure(file)
-    mine.start()
-    yield mine
-    mine.end()
+    stopped_router.start()
+    return stopped_router
 
 
 def test_the_last_value_of_a_latched_topic_is_asked_for_if_it_was_dropped(

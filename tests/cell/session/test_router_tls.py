@@ -22,7 +22,7 @@ from tests.cell.session.test_router_config import ATTACHMENT, PANEL, TEXT, TOLD_
 from tests.support.builders import press_widget
 from tests.support.certificates import tls_session
 from tests.support.parts import Process, free_port, until
-from tests.support.rmw import Router
+from tests.support.rmw import Router, configured_router
 from tests.support.waiting import when
 
 pytestmark = pytest.mark.promise("neighbours")
@@ -41,22 +41,19 @@ def door() -> str:
 
 
 @pytest.fixture
-def router(panel: Path, door: str, tmp_path: Path) -> Iterator[Router]:
+def router(zenohd: None, panel: Path, door: str, tmp_path: Path) -> Iterator[Router]:
     """It tells everyone of all subscribers, so that a stranger tries."""
-    mine, file, folder = Router(), tmp_path / "router.json5", tmp_path / "pki"
+    file, folder = tmp_path / "router.json5", tmp_path / "pki"
     assert main(["pki", "new", str(folder), "--panel", str(panel), "--connect", door]) == 0
     assert main(["pki", "add", str(folder), "other", "--client"]) == 0
-    options = ["--listen", door, "--tls", str(folder), "-o", str(file)]
-    assert main(["router-config", str(panel), *options]) == 0
+    mine = configured_router(panel, file, door, "--tls", str(folder))
     config = zenoh.Config.from_file(file)
     access = json.loads(config.get_json("access_control"))
     access["rules"].append(TOLD_OF_ALL)
     access["subjects"].append({"id": "everyone"})
     access["policies"].append({"rules": ["told"], "subjects": ["everyone"]})
     config.insert_json5("access_control", json.dumps(access))
-    config.insert_json5("listen/endpoints", json.dumps([mine.endpoint, door]))
     file.write_text(str(config))
-    mine.configure(file)
     mine.start()
     yield mine
     mine.end()

@@ -13,7 +13,7 @@ from app.cell.site.summary import read_summary
 from app.ros.zenoh.site import alive_key, summary_key
 from tests.support.cells import Cells, client_of
 from tests.support.parts import ROOT, Server, until
-from tests.support.rmw import Router
+from tests.support.rmw import Router, SessionRouter
 
 SITE: Final = """
 [site]
@@ -67,7 +67,7 @@ format = ".0f"
 
 @pytest.fixture
 def router() -> Iterator[Router]:
-    mine = Router()
+    mine = SessionRouter()
     mine.start()
     yield mine
     mine.end()

@@ -29,7 +29,7 @@ PANEL: Final = panel_of(MESSAGE, GUARDED)
 
 
 @pytest.fixture
-def router(domain: int) -> Iterator[Router]:
+def router(zenohd: None) -> Iterator[Router]:
     mine = Router()
     mine.start()
     yield mine
@@ -101,16 +101,29 @@ def test_a_bridge_and_nodes_at_one_router_are_an_error_that_asks_which(
 
 
 def test_a_router_without_an_admin_space_is_an_error_with_its_line(tmp_path: Path) -> None:
-    mine = router_without_admin_space(tmp_path)
-    mine.start()
-    robot = RmwNode(mine, "arm")
+    lacks_an_admin_space(router_without_admin_space(tmp_path), tmp_path)
+
+
+def test_zenohd_whose_admin_space_may_not_be_read_is_the_same_error(
+    zenohd: None, tmp_path: Path
+) -> None:
+    router, file = Router(), tmp_path / "router.json5"
+    listen = f'listen: {{ endpoints: ["{router.endpoint}"] }}'
+    file.write_text(f"{{ {listen}, adminspace: {{ permissions: {{ read: false, write: false }} }} }}")
+    router.configure(file)
+    lacks_an_admin_space(router, tmp_path)
+
+
+def lacks_an_admin_space(router: Router, folder: Path) -> None:
+    router.start()
+    robot = RmwNode(router, "arm")
     try:
-        report = diagnosed(mine, tmp_path)
+        report = diagnosed(router, folder)
         assert "link_router_no_admin" in report.codes()
         assert "adminspace: { enabled: true" in as_text(report)
     finally:
         robot.end()
-        mine.end()
+        router.end()
 
 
 def test_a_router_without_a_robot_is_said(

@@ -1,19 +1,23 @@
-"""A Zenoh router for the tests: `python -m tests.support.processes.rmw_router ENDPOINT`, until
-SIGTERM; or with a configuration file in place of the endpoint. It is the same router as `zenohd`, in a
-session of eclipse-zenoh."""
+"""A Zenoh router in a session of eclipse-zenoh, for the tests of `make test`:
+`python -m tests.support.processes.session_router ENDPOINT`, until SIGTERM; or with a configuration file
+in place of the endpoint. All other tests use `zenohd`."""
 
+import json
 import os
 import signal
 import sys
 
 import zenoh
 
+from tests.support.rmw import LISTENS
+
 
 def main(place: str) -> None:
     os.environ.pop("ZENOH_RUNTIME", None)  # the panel's own, which its tests have inherited
     config = zenoh.Config.from_file(place) if place.endswith(".json5") else with_defaults(place)
     with zenoh.open(config):
-        print("router: running", file=sys.stderr, flush=True)
+        for endpoint in json.loads(config.get_json("listen/endpoints")):
+            print(LISTENS, endpoint, file=sys.stderr, flush=True)
         signal.sigwait({signal.SIGTERM, signal.SIGINT})
 
 
@@ -25,7 +29,6 @@ def with_defaults(endpoint: str) -> zenoh.Config:
         "scouting/multicast/enabled": "false",
         "adminspace/enabled": "true",
         "timestamping/enabled": "true",
-        "routing/router/peers_failover_brokering": "false",  # as rmw_zenoh's own configuration has it
     }.items():
         config.insert_json5(place, value)
     return config
