@@ -10,17 +10,19 @@ from typing import Final
 from app.system.texts.catalogue import translations
 
 LINK: Final = re.compile(r"\[([^\]]*)\]\([^)]*\)")  # of Markdown
+TABLE: Final = re.compile(r"(?<!\w)\[\[?([a-z_]+)\]\]?")  # as a TOML file has it
+BETWEEN: Final = "\n\n"  # the texts of a key that says several things
 
 
 def plain_words(text: str) -> str:
-    """A text of the reference without its marks of Markdown."""
-    return LINK.sub(r"\1", text).replace("`", "")
+    """A text of the reference without its marks of Markdown and the brackets of tables."""
+    return TABLE.sub(r"\1", LINK.sub(r"\1", text)).replace("`", "")
 
 
 def help_in(text: str, language: str) -> str:
     """A description of the reference in plain words, in a language where there is a translation."""
-    plain = plain_words(text)
-    return help_texts(language).get(plain, plain)
+    known = help_texts(language)
+    return BETWEEN.join(known.get(plain, plain) for plain in plain_words(text).split(BETWEEN))
 
 
 @cache
