@@ -4,16 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from app.panel.file.toml_lines import Path
+from app.panel.layout import COLUMNS
 from app.panel.reference.schema import WORDS
 from app.system.errors import NotFound
 from app.system.texts import TextLike, render, say
 from app.tools.editor.document import Change, edit_from, path_from
 from app.tools.editor.editor import Editor, PartRequest
 from app.tools.editor.help import help_in
-from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, ICONS, NAMES, added, place_near
+from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, ICONS, NAMES, PLACELESS, added, place_near
 from app.tools.editor.paths import EMPTY
 from app.tools.editor.paths import at as value_at
 from app.tools.editor.robot_list import SECTIONS, Row, Section
@@ -71,6 +72,7 @@ def parts_pane(request: PartRequest) -> tuple[str, Mapping[str, Any]]:
     return "_parts.html", {
         "families": families,
         "described": described,
+        "placeless": PLACELESS,
         "words": {"search": say("editor_search_parts")},
     }
 
@@ -139,8 +141,9 @@ def _is_for(choice: Suggestion, on: Mapping[str, Any]) -> bool:
 
 class Addition(BaseModel):
     """What is added: the suggestion `choice` of an item of the robot's list, or a `kind`. `at` is its
-    place among widgets, without it near the path `near`, on the page `page`; `on` is the widget that it
-    is dropped on."""
+    place among widgets or groups, without it near the path `near`, on the page `page`; `on` is the
+    widget that it is dropped on, [] for none. What is added by a key is dropped on what is selected.
+    `span` are the columns of an empty place, 0 for all of its group's."""
 
     revision: int
     section: str = ""
@@ -150,6 +153,7 @@ class Addition(BaseModel):
     at: list[str | int] | None = None
     near: list[str | int] | None = None
     on: list[str | int] | None = None
+    span: int = Field(default=0, ge=0, le=COLUMNS)
     page: str = ""
 
 
@@ -158,16 +162,18 @@ def add(editor: Editor, addition: Addition, language: str, author: str = "") -> 
     tables = editor.document.tables
     near = path_from(addition.near) if addition.near else ()
     near = near[:-3] if near[-1:] == (EMPTY,) else near
+    on = near if addition.kind and addition.on is None else path_from(addition.on or ())
+    dropped_on = on if _table(editor, on) else None
     if addition.kind:
         if addition.kind not in NAMES:
             raise NotFound(f'there is no kind "{addition.kind:.64}"')
         own = tables.get("language", language)
         label = render(NAMES[addition.kind], own if isinstance(own, str) else language)
         group = addition.kind == "group"
-        at = path_from(addition.at) if addition.at and not group else None
-        at = at or place_near(tables, near, addition.page, group=group)
-        on = near if addition.kind == "interlock" and is_command(_table(editor, near)) else None
-        drop = added(addition.kind, label, tables, at, on)
+        at = path_from(addition.at) if addition.at else ()
+        if at[-2:-1] != ("group" if group else "widget",):
+            at = place_near(tables, near, addition.page, group=group)
+        drop = added(addition.kind, label, tables, at, dropped_on)
     else:
         section, key = _item(addition.section, addition.key)
         known = editor.robots.suggestions(section, key, editor.preview.panel)
@@ -175,9 +181,17 @@ def add(editor: Editor, addition: Addition, language: str, author: str = "") -> 
             raise NotFound(say("editor_item_gone", name=key[:64]))
         choice = known.choices[addition.choice]
         at = path_from(addition.at) if addition.at else place_near(tables, near, addition.page)
-        on = path_from(addition.on) if addition.on else None
-        drop = drop_of(choice, tables, at, on if on and _table(editor, on) else None)
-    return _applied(editor, drop, addition, author)
+        drop = drop_of(choice, tables, at, dropped_on)
+    return _applied(editor, _narrowed(drop, addition.span), addition, author)
+
+
+def _narrowed(drop: Drop, span: int) -> Drop:
+    """The drop with a widget of at most so many columns; 0: of any."""
+    if not span or drop.select[-2:-1] != ("widget",):
+        return drop
+    first, *others = drop.edits
+    value = {**first["value"], "span": min(span, first["value"].get("span", span))}
+    return replace(drop, edits=[{**first, "value": value}, *others])
 
 
 def _applied(editor: Editor, drop: Drop, addition: Addition, author: str) -> Change:

@@ -146,7 +146,7 @@ ONLY_WITH_LIMITS: Final = (
     *("scale", "offset", "max_age_s", "qos"),
 )
 # Texts that people write in several lines.
-LONG_TEXTS: Final = frozenset({"action", "cause", "consequence", "stop_hint", "locked"})
+LONG_TEXTS: Final = frozenset({"action", "cause", "consequence", "help", "stop_hint", "locked"})
 
 # Tables with a form of their own, opened from a list; other tables are within the form that has them.
 OPENED: Final = frozenset(

@@ -101,6 +101,7 @@ SENDS: Final[Mapping[Control, Sends]] = {
     "colour": "text",
 }
 EXACT: Final = 2.0**53  # the limit of every number in a browser; no limit that a form names
+WORD: Final = re.compile(r"[a-z_]+")
 LONG: Final = 200  # characters of a text from which on a field has several lines
 FEW: Final = 4  # choices that stand side by side, if they are short
 SHORT: Final = 8
@@ -316,6 +317,17 @@ class Form:
     @property
     def plain_help(self) -> str:
         return plain_words(self.help)
+
+    @property
+    def needed(self) -> str:
+        """The id of the field that is filled in first: one that is faulty or required, else the first
+        key that a fault asks for, else the first text; "" for none."""
+        fields = tuple(self.fields)
+        asked = [key for fault in self.faults for key in WORD.findall(fault.rpartition(": ")[2])]
+        named = sorted((asked.index(each.key), each.dom) for each in fields if each.key in asked)
+        first = (each.dom for each in fields if each.is_bad)
+        texts = (each.dom for each in fields if each.control in ("texts", "text"))
+        return next(first, next((dom for _, dom in named), next(texts, "")))
 
     @property
     def fields(self) -> Iterator[Field]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from app.panel.file.toml_lines import Path
 from app.system.texts import Text, say
 from app.tools.editor.references import OWNERS, taken_ids
-from app.tools.editor.suggestions import Drop, Suggestion, drop_of, lock_by
+from app.tools.editor.suggestions import Drop, Suggestion, drop_of, lock_by, value_of
 from app.tools.scaffold.parts import id_of
 
 
@@ -74,6 +74,7 @@ FAMILIES: Final[Mapping[str, Sequence[Kind]]] = {
     ),
 }
 NO_WIDGETS: Final = tuple(kind.table for kind in FAMILIES["file"])
+PLACELESS: Final = tuple(kind for kind in NO_WIDGETS if kind != "group")  # on no page
 NAMES: Final[Mapping[str, Text]] = {
     kind.table: kind.name for family in FAMILIES.values() for kind in family
 }
@@ -94,7 +95,7 @@ def added(kind: str, label: Any, tables: Mapping[str, Any], at: Path, on: Path |
     """The edits that add a table of this kind with a label. A widget is inserted `at` its place in a
     list of widgets, a group `at` its place in a page's groups, others at the end of their lists. Keys
     that it needs and that only a person knows are missing: `check` names them. An interlock locks the
-    command `on`, if there is one."""
+    command `on`, an alarm is about the value `on`, if there is one."""
     if kind not in NO_WIDGETS:
         return drop_of(Suggestion("widget", kind, {"label": label}, kind), tables, at)
     if kind == "group":
@@ -103,9 +104,11 @@ def added(kind: str, label: Any, tables: Mapping[str, Any], at: Path, on: Path |
     named = {"page": {"title": label}, "alarm": {"text": label}, "source": {}}
     keys = named.get(kind, {"label": label})
     value = {"id": id_of(kind, taken_ids(tables)[OWNERS[(kind,)]]), **keys}
+    if kind == "alarm" and on is not None:
+        value |= value_of(tables, on)
     place = (kind, len(listed))
     edits: list[Mapping[str, Any]] = [{"op": "insert", "path": [*place], "value": value}]
-    if on is not None and (lock := lock_by(tables, on, str(value["id"]))):
+    if kind == "interlock" and on is not None and (lock := lock_by(tables, on, str(value["id"]))):
         edits.append(lock)
     return Drop(edits, place)
 

@@ -92,6 +92,8 @@ WORDS: Final = {
     "curve": say("editor_curve"),
     "write_again": say("editor_write_again"),
     "send": say("send_title"),
+    "panes": say("editor_panes"),
+    "view": say("editor_view"),
 }
 
 

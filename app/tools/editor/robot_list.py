@@ -19,12 +19,13 @@ from app.panel.widgets.parts import parts_of
 from app.ros.graph.model import (
     EndpointQos,
     GraphSnapshot,
+    Node,
     RobotGraph,
     Server,
     SurveyedTopic,
     TopicEndpoint,
 )
-from app.ros.graph.node_services import NodeParameter, NodeServices
+from app.ros.graph.node_services import LIST, NodeParameter, NodeServices
 from app.ros.messages import Interfaces, Type, load_interfaces
 from app.ros.messages.definitions import attribute_name
 from app.ros.messages.validation import format_value
@@ -261,7 +262,7 @@ class RobotList:
     async def _read_parameters(self, services: NodeServices, robot: RobotGraph) -> None:
         own = {bridge.node for bridge in robot.bridges}
         read: dict[str, NodeParameter] = {}
-        for node in robot.nodes:
+        for node in nodes_of(robot):
             if node.name in own:
                 continue
             with suppress(KioskError):
@@ -338,7 +339,7 @@ class RobotList:
     @property
     def nodes(self) -> Sequence[str]:
         """The names of the robot's nodes."""
-        return [node.name for node in self.robot.nodes] if self.robot else []
+        return [node.name for node in nodes_of(self.robot)] if self.robot else []
 
     def field_values(self, name: str, panel: Panel | None) -> Mapping[str, str]:
         """The newest values of a topic's plain fields, by their paths."""
@@ -414,6 +415,17 @@ def _as_panel_names(item: Named, namespace: str) -> Named:
     if not namespace or not item.name.startswith(f"{namespace}/"):
         return item
     return replace(item, name=item.name.removeprefix(namespace))
+
+
+def nodes_of(robot: RobotGraph) -> Sequence[Node]:
+    """The nodes of a robot, with those that are known by their parameters' services alone: the
+    simulated robot has no bridge that lists nodes."""
+    known = {node.name: node for node in robot.nodes}
+    for service in robot.services:
+        name, _, own = service.name.rpartition("/")
+        if own == LIST[0] and name:
+            known.setdefault(name, Node(name=name))
+    return list(known.values())
 
 
 def fullest(graph: GraphSnapshot) -> RobotGraph:

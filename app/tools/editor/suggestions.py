@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 
 from app.panel.condition import COMPARISONS
 from app.panel.file.toml_lines import Path
+from app.panel.shared_keys import NumberKeys
 from app.panel.widgets.families import Command
 from app.panel.widgets.kinds import KINDS
 from app.ros.graph.model import Server, SurveyedTopic
@@ -268,6 +269,16 @@ def lock_by(tables: Any, on: Path, interlock: str) -> Mapping[str, Any] | None:
         return None
     value = interlock if not names else [*names, interlock]
     return {"op": "set", "path": [*on, "interlock"], "value": value}
+
+
+def value_of(tables: Any, on: Path) -> Mapping[str, Any]:
+    """What the value of a widget is, as an alarm has it; empty for a widget without one."""
+    widget = tables
+    for step in on:
+        widget = widget[step]
+    kind = KINDS.get(str(widget.get("kind")))
+    is_value = kind is not None and issubclass(kind.model, NumberKeys)
+    return {key: widget[key] for key in ("source", *ALARM_KEYS) if key in widget} if is_value else {}
 
 
 def is_command(widget: Mapping[str, Any]) -> bool:

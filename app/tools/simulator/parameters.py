@@ -1,7 +1,7 @@
 """The parameters of simulated nodes, as the services of a node give and take them: pure.
 
-Shapes: rcl_interfaces' GetParameters, DescribeParameters, SetParameters, SetParametersAtomically and
-ParameterEvent.
+Shapes: rcl_interfaces' ListParameters, GetParameters, DescribeParameters, SetParameters,
+SetParametersAtomically and ParameterEvent.
 """
 
 import math
@@ -16,6 +16,7 @@ NODE: Final = "/system_controller"  # of the robot that the shipped panel is for
 EVENTS: Final = "/parameter_events"
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
 SERVICES: Final[Mapping[str, str]] = {
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
     "get_parameters": "rcl_interfaces/srv/GetParameters",
     "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
     "set_parameters": "rcl_interfaces/srv/SetParameters",
@@ -82,6 +83,8 @@ class NodeParameters:
             if reason := next(reasons, ""):
                 return {"result": {"successful": False, "reason": reason}}
             return {"result": [self._set(parameter) for parameter in request.parameters][-1]}
+        if service.endswith("/list_parameters"):
+            return {"result": {"names": sorted(self._declared), "prefixes": []}}
         known = all(name in self._declared for name in request.names)
         parameters = [(name, self._declared[name]) for name in request.names] if known else []
         if service.endswith("/get_parameters"):

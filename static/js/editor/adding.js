@@ -1,13 +1,13 @@
 // The panes "Robot" and "Parts": live values, search, and adding by a drag to the page or by Enter.
 import { emptyPlace, placeAt, pointOf } from "./arrange.js";
 import { dropOfNew, showMark } from "./change.js";
-import { fill, focusAgain, onPane } from "./panes.js";
+import { fill, fillIn, focusAgain, onPane } from "./panes.js";
 import { shownPage } from "./preview.js";
 import { select, selection } from "./selection.js";
 import { add, get, part } from "./wire.js";
 
 /** @typedef {import("./wire.js").Path} Path */
-/** @typedef {{ at?: Path, on?: Path }} Target */
+/** @typedef {{ at?: Path, on?: Path, span?: number }} Target */
 
 const VALUES_MS = 1000;
 const DRAGGED_PX = 5;
@@ -56,7 +56,7 @@ async function refresh() {
 async function addItem(item, target, point) {
   const pane = left.contains(item) ? left : form;
   const near = selection();
-  const place = { at: emptyPlace(), ...target, near, page: shownPage() };
+  const place = { ...emptyPlace(), ...target, near, page: shownPage() };
   if (item.dataset.kindOf) {
     chosen(await add({ ...place, kind: item.dataset.kindOf }));
     return;
@@ -80,7 +80,9 @@ async function addItem(item, target, point) {
 
 /** @param {import("./wire.js").Answer | null} answer */
 function chosen(answer) {
-  if (answer?.select) select(answer.select, "edit");
+  if (!answer?.select) return;
+  select(answer.select, "edit");
+  fillIn();
 }
 
 /** @param {KeyboardEvent} event */
@@ -129,7 +131,14 @@ function onMove(event) {
   drag.ghost.style.left = `${event.clientX + 12}px`;
   drag.ghost.style.top = `${event.clientY + 12}px`;
   const { x, y } = pointOf(event);
-  showMark(isOverPage(event) ? dropOfNew(x, y) : null);
+  showMark(isOverPage(event) ? dropOf(drag.item, x, y) : null);
+}
+
+// Where an item would come; null for what has no place on a page.
+/** @param {HTMLElement} item @param {number} x @param {number} y */
+function dropOf(item, x, y) {
+  if (item.hasAttribute("data-placeless")) return null;
+  return dropOfNew(x, y, item.dataset.kindOf === "group" ? "group" : "widget");
 }
 
 /** @param {PointerEvent} event */
@@ -150,10 +159,11 @@ function onUp(event) {
   if (!isOverPage(event)) return;
   const { x, y } = pointOf(event);
   const place = placeAt(x, y);
-  const at = place?.room ? place.path.slice(0, -1) : undefined;
-  const isWidget = at?.at(-2) === "widget";
-  const target = isWidget ? { at } : { at: dropOfNew(x, y)?.to, on: place?.path };
-  addItem(item, target, { x: event.clientX, y: event.clientY });
+  const room = place?.room ? place.path.slice(0, -1) : null;
+  const isRoom = room?.at(-2) === (item.dataset.kindOf === "group" ? "group" : "widget");
+  const on = place && !place.room ? place.path : [];
+  const target = room && isRoom ? { at: room, span: place?.span ?? 0 } : { at: dropOf(item, x, y)?.to, span: 0 };
+  addItem(item, { ...target, on }, { x: event.clientX, y: event.clientY });
 }
 
 function end() {

@@ -1,4 +1,5 @@
 // Arrange: the overlay on the preview takes pointer and keyboard, and selects what the page shows.
+import { enterForm } from "./panes.js";
 import { onDrawn, shownDocument, shownPage, shownScale, showPage } from "./preview.js";
 import { isAround, isSame, onSelect, select, selection } from "./selection.js";
 import { get, onState, state } from "./wire.js";
@@ -14,9 +15,10 @@ import { get, onState, state } from "./wire.js";
  * @property {Size | null} size
  * @property {string[] | null} [beside] Of an empty place: the parts of the element that leave room.
  * @property {Box} [room] Of an empty place.
+ * @property {number} [span] Of an empty place: the columns that it has, 0 for the whole width.
  */
 
-const TAG_ROOM = 34; // px that a name tag needs below a ring
+const TAG_ROOM = 39; // px that a name tag needs below a ring
 
 const overlay = /** @type {HTMLElement} */ (document.getElementById("overlay"));
 const spoken = /** @type {HTMLElement} */ (document.getElementById("selected"));
@@ -56,6 +58,7 @@ function roomsIn(place) {
   /** @param {number} number @param {Box} room */
   const made = (number, room) => ({
     ...place,
+    span: columnsOf(place, room),
     path: [...place.path.slice(0, -2), Math.max(0, step + number), "+"],
     selector: `${place.selector} +${number}`,
     tag: overlay.dataset.empty ?? "",
@@ -79,6 +82,11 @@ function roomsIn(place) {
         made(number + 1, { left: row.left, top: row.top, width: right - row.left, height: row.bottom - row.top }),
       );
   }
+  for (const box of boxes) {
+    if (!box) continue;
+    const room = roomBelow(box, boxes, inset / 2);
+    rooms.push(made(boxes.findLastIndex((other) => other && isBefore(other, room, inset)) + 1, room));
+  }
   const below = row.bottom + inset / 2;
   const left = outer.left + inset;
   rooms.push(
@@ -87,10 +95,41 @@ function roomsIn(place) {
   return rooms.filter(({ room }) => room.width >= LEAST_ROOM && room.height >= LEAST_ROOM);
 }
 
-// Where a new table comes if an empty place is selected.
+// Whether a part comes before a room, row by row.
+/** @param {Box} box @param {Box} room @param {number} near */
+const isBefore = (box, room, near) => box.top < room.top - near || (box.top <= room.top + near && box.left < room.left);
+
+// The columns of a room, by those of a part beside it; 0 where it has all of them.
+/** @param {Place} place @param {Box} room */
+function columnsOf(place, room) {
+  const [selector = ""] = place.beside ?? [];
+  const size = known.find((other) => other.selector === selector)?.size;
+  const box = size && boxAt(selector);
+  if (!box || place.path.at(-3) !== "widget") return 0;
+  const columns = Math.max(1, Math.round((room.width * size.span) / box.width));
+  return columns < size.columns ? columns : 0;
+}
+
+// The room between a part and the end of its row, beside a higher part.
+/** @param {Box} box @param {(Box | null)[]} boxes @param {number} gap @returns {Box} */
+function roomBelow(box, boxes, gap) {
+  const bottom = box.top + box.height;
+  let end = bottom;
+  let next = Infinity; // the top of what is below it
+  for (const other of boxes) {
+    if (!other || other === box) continue;
+    const isBelow = other.left < box.left + box.width - 1 && other.left + other.width > box.left + 1;
+    if (isBelow && other.top >= bottom - 1) next = Math.min(next, other.top - gap);
+    else if (other.top < bottom - 1) end = Math.max(end, other.top + other.height);
+  }
+  const top = bottom + gap;
+  return { left: box.left, top, width: box.width, height: Math.min(end, next) - top };
+}
+
+// Where a new table comes if an empty place is selected, and its width.
 export function emptyPlace() {
   const path = selection();
-  return path?.at(-1) === "+" ? path.slice(0, -1) : undefined;
+  return path?.at(-1) === "+" ? { at: path.slice(0, -1), span: placeOf(path)?.span ?? 0 } : {};
 }
 
 function measure() {
@@ -172,9 +211,10 @@ function addRing(place, tag, kind) {
   ring.append(label);
   const { clientHeight, clientWidth } = overlay;
   if (box.top + box.height + TAG_ROOM > clientHeight) ring.classList.add(box.top > TAG_ROOM ? "above" : "inside");
-  if (box.left + box.width > clientWidth || box.left < clientWidth / 4) ring.classList.add("start");
   if (kind === "chosen") for (let number = 0; number < 4; number += 1) ring.append(document.createElement("i"));
   overlay.append(ring);
+  const right = box.left + box.width;
+  if (right > clientWidth || right < label.offsetWidth) ring.classList.add("start");
 }
 
 /** @param {HTMLElement} element @param {Box} box */
@@ -233,11 +273,6 @@ function chooseAround() {
   const inner = path.at(-1) === "+" ? path.slice(0, -3) : path.slice(0, -1);
   const outer = places.filter((place) => isAround(place.path, inner));
   choose(outer.at(-1));
-}
-
-function enterForm() {
-  const field = document.querySelector("#form input, #form select, #form textarea, #form .form button");
-  if (field instanceof HTMLElement) field.focus();
 }
 
 // A selected table that is on another page brings that page.

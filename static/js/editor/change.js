@@ -190,11 +190,11 @@ export function showMark(drop) {
   overlay.append(mark);
 }
 
-// Where a new widget would come if it was let go at a point; null where the page has no widget or group.
-/** @param {number} x @param {number} y */
-export function dropOfNew(x, y) {
+// Where a new widget or group would come if it was let go at a point; null where the page has no widget or group.
+/** @param {number} x @param {number} y @param {"group" | "widget"} kind */
+export function dropOfNew(x, y, kind) {
   const page = shownPlaces().find(({ selector }) => selector === "main")?.path ?? [];
-  return dropAt({ path: [...page, "widget", Infinity], selector: "", tag: "", size: null }, x, y);
+  return dropAt({ path: [...page, kind, Infinity], selector: "", tag: "", size: null }, x, y);
 }
 
 // Where a table would come if it was let go at a point.

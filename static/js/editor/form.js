@@ -193,6 +193,14 @@ export class Form {
     this.#focusIn(document.getElementById(id), `${CONTROLS}, summary`);
   }
 
+  // Puts the focus into the field that is filled in first, when the form is drawn.
+  async focusNeeded() {
+    await this.#drawing;
+    const id = this.#pane.querySelector("[data-needed]")?.getAttribute("data-needed") ?? "";
+    const row = /** @type {HTMLElement | null} */ (this.#pane.querySelector(`[data-row="${CSS.escape(id)}"]`));
+    this.#focusIn(document.getElementById(id) ?? row, `${CONTROLS}, summary`);
+  }
+
   // Posts what is being typed, and waits until all that was posted has an answer.
   enter() {
     const entry = document.activeElement;

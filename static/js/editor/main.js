@@ -73,6 +73,8 @@ onState((now, before) => {
   const title = get("stage-title");
   title.textContent = (now.faults ? title.dataset.faulty : title.dataset.good) ?? "";
   title.classList.toggle("faulty", now.faults > 0);
+  get("fault-count").textContent = String(now.faults);
+  get("fault-count").hidden = !now.faults;
   if (now.drawn !== before.drawn) areKeysOld = true;
 });
 

@@ -18,6 +18,53 @@ const shown = new Form(form, {
   upload,
 });
 
+// On a narrow screen the panes beside the preview share one place; on a small one those below come when they are asked
+// for. Wide screens show all of them.
+const NARROW = "(max-width: 1200px)"; // as in editor.css
+
+/** @param {string} name "left", "form", or "" for none */
+function showSide(name) {
+  document.body.dataset.side = name;
+  markSides();
+}
+
+/** @param {string} name */
+function toggleSide(name) {
+  if (name === "foot") document.body.toggleAttribute("data-foot");
+  else showSide(document.body.dataset.side === name ? "" : name);
+  markSides();
+}
+
+function markSides() {
+  const { side, foot } = document.body.dataset;
+  for (const button of document.querySelectorAll("[data-side-of]")) {
+    const name = button.getAttribute("data-side-of");
+    button.setAttribute("aria-pressed", String(name === "foot" ? foot !== undefined : name === side));
+  }
+}
+
+// Shows the form, with the focus in the field that is filled in first.
+export function fillIn() {
+  showSide("form");
+  return shown.focusNeeded();
+}
+
+// Shows the form, with the focus in its first field.
+export function enterForm() {
+  showSide("form");
+  const field = document.querySelector("#form input, #form select, #form textarea, #form .form button");
+  if (field instanceof HTMLElement) field.focus();
+}
+
+// The form takes the place of the lists, unless they have the focus. One that was closed stays closed.
+/** @param {string} from */
+function showSelected(from) {
+  const isInLists = left.contains(document.activeElement);
+  if (document.body.dataset.side === "left" && (from === "preview" || (from === "edit" && !isInLists)))
+    showSide("form");
+  if (from === "outline" && matchMedia(NARROW).matches) fillIn();
+}
+
 // What is being typed in the form counts as entered.
 export const entered = () => shown.enter();
 
@@ -127,8 +174,13 @@ function onClick(event) {
   const tab = target?.closest("[data-tab]");
   if (tab?.dataset.tab) showTab(tab.dataset.tab);
   const chosen = target?.closest("[data-select]");
-  if (chosen?.dataset.select) select(JSON.parse(chosen.dataset.select), "list");
+  if (chosen?.dataset.select) {
+    select(JSON.parse(chosen.dataset.select), "list");
+    showSide("form");
+  }
   if (chosen?.dataset.field) shown.focus(chosen.dataset.field);
+  const side = target?.closest("[data-side-of]")?.getAttribute("data-side-of");
+  if (side) toggleSide(side);
 }
 
 export function start() {
@@ -145,7 +197,10 @@ export function start() {
     timer = setTimeout(fillAll, now.drawn === before.drawn ? 0 : AFTER_MS);
   });
   onDrawn(fillAll);
-  onSelect(() => shown.show(selection() ?? []));
+  onSelect((_path, from) => {
+    shown.show(selection() ?? []);
+    showSelected(from);
+  });
   onPane((pane) => pane === faults && markFault());
   onSelect(markFault);
   if (state.revision) showTab(left.dataset.part ?? "outline");

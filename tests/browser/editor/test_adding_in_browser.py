@@ -1,5 +1,6 @@
 """The panes "Robot" and "Parts" with a mouse and a keyboard."""
 
+import json
 import tomllib
 from collections.abc import Callable, Iterator
 from typing import Any, Final
@@ -7,6 +8,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
+from app.tools.editor.forms import element_id
 from tests.browser.editor.test_editor_in_browser import opened
 from tests.browser.test_accessibility import ALL, AXE, RUN
 from tests.support.browser.browsers import ReusedPage
@@ -69,7 +71,7 @@ def wait(page: Page, is_so: Callable[[], Any], about: str) -> None:
 def item(page: Page, tab: str, name: str) -> Any:
     """The line of a pane with this name."""
     page.locator(f"#tab-{tab}").click()
-    line = page.locator(".offer").filter(has=page.locator(f"b:text-is('{name}')"))
+    line = page.locator("#left .offer").filter(has=page.locator(f"b:text-is('{name}')"))
     expect(line).to_be_visible()
     return line
 
@@ -127,6 +129,69 @@ def test_by_keys_alone_a_part_is_added_behind_the_selected(desk: Page, running: 
     label = written(running)["page"][0]["group"][0]["widget"][1]
     assert label == {"id": "label", "kind": "label", "label": "Text"}
     expect(preview(desk).locator("#at-label")).to_be_visible()
+
+
+BELT: Final = ["page", 0, "group", 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "key", "is_placed"),
+    [
+        ("Page", ["page", 2], "title", False),
+        ("Interlock", ["interlock", 0], "topic", False),
+        ("Condition", ["condition", 0], "topic", False),
+        ("Alarm", ["alarm", 0], "topic", False),
+        ("Source", ["source", 0], "topic", False),
+        ("Group", ["page", 0, "group", 0], "title", True),
+        ("Gauge", [*BELT, "widget", 1], "topic", True),
+    ],
+)
+def test_a_dropped_part_is_made_and_its_form_asks_for_what_it_needs(
+    desk: Page, running: EditorServer, name: str, path: list[Any], key: str, is_placed: bool
+) -> None:
+    line = item(desk, "parts", name)
+    line.scroll_into_view_if_needed()
+    grip = line.bounding_box()
+    speed = box_of(desk, "#at-speed")
+    assert grip is not None
+    desk.mouse.move(grip["x"] + 60, grip["y"] + 12)
+    desk.mouse.down()
+    desk.mouse.move(speed["x"] + speed["width"] * 0.8, speed["y"] + 20, steps=5)
+    expect(desk.locator(".ghost")).to_have_text(name)
+    expect(desk.locator(".drop")).to_have_count(1 if is_placed else 0)
+    desk.mouse.up()
+    expect(desk.locator(f"[id='{element_id(tuple(path))}.{key}']")).to_be_focused()
+    made: Any = written(running)
+    for step in path:
+        made = made[step]
+    assert made
+    desk.locator("#tab-outline").click()
+    expect(desk.locator(".tr[aria-selected='true']")).to_have_attribute("data-path", json.dumps(path))
+    desk.locator("#undo").click()
+    wait(desk, lambda: running.state()["faults"] == 0, "one step is undone")
+
+
+def test_a_part_fills_the_empty_cell_that_was_selected(desk: Page, running: EditorServer) -> None:
+    """Of three columns the first is two rows high, and the second has something in both."""
+    own = [[*BELT, "widget", number] for number in range(4)]
+    speed = belt(running)[0]
+    both = [speed | {"id": name, "span": 4} for name in ("over", "beside")]
+    running.edit(
+        {"op": "set", "path": [*own[0], "span"], "value": 4},
+        {"op": "set", "path": [*own[0], "rows"], "value": 2},
+        {"op": "set", "path": [*own[1], "span"], "value": 4},
+        *({"op": "insert", "path": own[2 + at], "value": table} for at, table in enumerate(both)),
+    ).raise_for_status()
+    expect(preview(desk).locator("#at-beside")).to_be_visible()
+    over, beside = box_of(desk, "#at-over"), box_of(desk, "#at-beside")
+    desk.mouse.click(middle(over)[0], middle(beside)[1])
+    expect(desk.locator(".ring.chosen .tag")).to_have_text("Empty place")
+    item(desk, "parts", "Text").press("Enter")
+    wait(desk, lambda: len(belt(running)) == 5, "the text is added")
+    assert belt(running)[4] == {"id": "label", "kind": "label", "label": "Text", "span": 4}
+    made = box_of(desk, "#at-label")
+    assert made["x"] == pytest.approx(over["x"], abs=1)
+    assert made["y"] == pytest.approx(beside["y"], abs=1)
 
 
 def test_words_filter_the_list_and_escape_adds_nothing(desk: Page, running: EditorServer) -> None:

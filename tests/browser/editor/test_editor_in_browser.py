@@ -543,3 +543,73 @@ def test_the_curve_counts_and_shows_the_line_of_operators(curve: Page) -> None:
     curve.get_by_role("button", name="Show the page").click()
     expect(curve.locator("#curve")).to_be_hidden()
     expect(preview(curve).locator("#at-speed")).to_be_visible()
+
+
+NARROW: Final = [(1024, 600), (800, 480)]
+BUTTONS: Final = ".bar :is(button, a), .left [role='tab'], #pages button, #form [role='tab']"
+# Buttons that are partly outside of the window, or over one another.
+UNREACHABLE: Final = """selector => {
+  const buttons = [...document.querySelectorAll(selector)].filter((button) => button.checkVisibility());
+  const boxes = buttons.map((button) => ({ button, box: button.getBoundingClientRect() }));
+  const isOut = ({ button, box }) => box.top < 0 || box.bottom > innerHeight + 1
+    || (!button.closest('#pages') && (box.left < 0 || box.right > innerWidth + 1));
+  const isOver = ({ button, box }) => boxes.some(({ button: other, box: on }) => other !== button
+    && box.left < on.right - 1 && on.left < box.right - 1
+    && box.top < on.bottom - 1 && on.top < box.bottom - 1
+    && !button.closest('#pages') && !other.closest('#pages'));
+  return boxes.filter((each) => isOut(each) || isOver(each))
+    .map(({ button }) => button.id || button.getAttribute('aria-label') || button.textContent.trim());
+}"""
+
+
+@pytest.mark.parametrize("language", ["en", "ja", "de"])
+@pytest.mark.parametrize(("width", "height"), [*NARROW, (1280, 800), (1440, 900), (1280, 600)])
+def test_every_button_can_be_reached_on_screens_of_any_size(
+    page: Page, editor: EditorServer, width: int, height: int, language: str
+) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    page.set_extra_http_headers({"accept-language": language})
+    opened(page, editor)
+    page.locator("#overlay").focus()
+    page.keyboard.press("End")
+    expect(page.locator("#form .form")).to_be_attached()
+    assert page.evaluate(UNREACHABLE, BUTTONS) == []
+    sizes = page.locator("[data-size]").first
+    if (width, height) in NARROW:
+        page.locator("#open-view").press("Enter")
+        assert page.evaluate(UNREACHABLE, "#view-choices button") == []
+        sizes.press("Escape")
+        expect(sizes).to_be_hidden()
+    else:
+        expect(sizes).to_be_visible()
+
+
+@pytest.mark.parametrize(("width", "height"), NARROW)
+def test_on_a_narrow_screen_the_panes_share_one_place(
+    desk: Page, editor: EditorServer, width: int, height: int
+) -> None:
+    desk.set_viewport_size({"width": width, "height": height})
+    lists, form, foot = (desk.locator(f"[data-side-of='{name}']") for name in ("left", "form", "foot"))
+    pane, table, faults = desk.locator("#left"), desk.locator("#form"), desk.locator("#faults")
+    expect(pane).to_be_visible()
+    expect(table).to_be_hidden()
+    select(desk, "#at-speed", SPEED)
+    expect(table).to_be_visible()  # in place of the lists
+    expect(pane).to_be_hidden()
+    form.press("Enter")
+    expect(table).to_be_hidden()  # the page has the whole width
+    select(desk, "#at-ready", READY)
+    expect(table).to_be_hidden()
+    desk.keyboard.press("Enter")
+    expect(table.locator(":focus")).to_have_count(1)
+    lists.press("Enter")
+    expect(pane).to_be_visible()
+    editor.edit({"op": "delete", "path": [*SPEED, "topic"]}).raise_for_status()
+    expect(foot).to_have_text("1")
+    expect(faults).to_be_hidden()
+    foot.press("Enter")
+    faults.locator(".fault").press("Enter")
+    expect(desk.locator(f"[id='{element_id((*SPEED, 'topic'))}']")).to_be_focused()
+    desk.evaluate(AXE)
+    run = RUN.replace("document,", "{exclude: ['iframe']},")
+    assert desk.evaluate(run, {"values": ALL, "type": "tag"}) == []

@@ -22,6 +22,7 @@ from app.tools.editor.forms import (
     Form,
     FormPage,
     RobotNames,
+    element_id,
     form_context,
     form_of,
     schema,
@@ -29,6 +30,7 @@ from app.tools.editor.forms import (
     table_path,
     value_at,
 )
+from app.tools.editor.kinds import NO_WIDGETS, added
 from app.web.pages.page_templates import PageTemplates
 from docs._generate.keys import examples_of
 from tests.support.parts import TESTS
@@ -468,3 +470,23 @@ def test_texts_of_several_lines_have_a_field_for_them() -> None:
     action = field_at(form_of(tomllib.loads(LOCKED), ("alarm", 1)), ("alarm", 1, "action"))
     assert action.control == "texts"
     assert action.tall
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [
+        *(("readout", "topic"), ("call", "service"), ("number", "min"), ("trend", "pen")),
+        *(("sequence", "steps"), ("label", "label"), ("page", "title"), ("group", "title")),
+        *(("interlock", "topic"), ("condition", "topic"), ("alarm", "topic"), ("source", "topic")),
+    ],
+)
+def test_the_field_to_fill_in_first(kind: str, key: str, tmp_path: FilePath) -> None:
+    document = Document('[[page]]\nid = "page"\ntitle = "Page"\n[[page.group]]\ntitle = "Group"\n')
+    at: Path = (
+        ("page", 0, "group", 0, "widget", 0) if kind not in NO_WIDGETS else ("page", 0, "group", 1)
+    )
+    drop = added(kind, "A", document.tables, at)
+    document.apply(map(edit_from, drop.edits), "added")
+    faults = faults_of_text(document.text, tmp_path)
+    form = form_of(document.tables, drop.select, faults=faults)
+    assert form.needed == element_id((*drop.select, key))

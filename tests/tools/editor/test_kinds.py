@@ -9,7 +9,7 @@ from app.panel.reference.schema import WORDS
 from app.panel.widgets.kinds import KINDS
 from app.system.icons import icons
 from app.system.texts import render
-from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, NO_WIDGETS, added, place_near
+from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, NO_WIDGETS, PLACELESS, added, place_near
 
 EVERY: Final = [kind for family in FAMILIES.values() for kind in family]
 GROUP: Final = ("page", 0, "group", 0)
@@ -56,6 +56,73 @@ def test_an_added_table_has_an_id_of_its_own(kind: str, at: Any, edit: Any) -> N
     drop = added(kind, "A", TABLES, at)
     assert drop.edits == [{"op": "insert", "path": [*at], "value": edit}]
     assert drop.select == at
+
+
+@pytest.mark.parametrize("kind", EVERY, ids=lambda kind: kind.table)
+def test_what_has_no_place_on_a_page_is_added_behind_its_like(kind: Any) -> None:
+    name = kind.table
+    at = place_near(TABLES, (), "page", group=name == "group")
+    select = added(name, "A", TABLES, at).select
+    assert select == ((name, len(TABLES.get(name, ()))) if name in PLACELESS else at)
+
+
+VALUE: Final[dict[str, Any]] = tomllib.loads("""
+[[page]]
+id = "page"
+[[page.widget]]
+id = "air"
+kind = "gauge"
+label = "Air"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+field = "data"
+unit = "bar"
+scale = 0.01
+min = 0
+max = 10
+[[page.widget]]
+id = "start"
+kind = "call"
+service = "/start"
+type = "std_srvs/srv/Trigger"
+[[page.widget]]
+id = "note"
+kind = "label"
+label = "Note"
+""")
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "keys", "locked"),
+    [
+        (
+            "alarm",
+            0,
+            {
+                "topic": "/air",
+                "type": "std_msgs/msg/Float64",
+                "field": "data",
+                "scale": 0.01,
+                "unit": "bar",
+            },
+            False,
+        ),
+        ("alarm", 1, {}, False),
+        ("alarm", 2, {}, False),
+        ("interlock", 0, {}, False),
+        ("interlock", 1, {}, True),
+        ("condition", 1, {}, False),
+    ],
+)
+def test_an_alarm_is_about_the_value_and_an_interlock_locks_the_command_it_is_dropped_on(
+    kind: str, number: int, keys: dict[str, Any], locked: bool
+) -> None:
+    on = ("page", 0, "widget", number)
+    first, *others = added(kind, "A", VALUE, (), on).edits
+    named = {"id": kind, "text" if kind == "alarm" else "label": "A"}
+    assert first == {"op": "insert", "path": [kind, 0], "value": named | keys}
+    lock = {"op": "set", "path": [*on, "interlock"], "value": "interlock"}
+    assert others == ([lock] if locked else [])
 
 
 PAGES: Final[dict[str, Any]] = tomllib.loads("""
