@@ -10,6 +10,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_l
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
+    InfoMetricFamily,
     Metric,
     SummaryMetricFamily,
 )
@@ -23,6 +24,7 @@ from app.cell.session.fleet import Fleet
 from app.cell.stops.oee import NOT_ANSWERED, SHORT, ShiftFigures
 from app.cell.view.machine_status import Machine
 from app.panel.rules import OeeRules
+from app.system.texts import render
 from app.web.metrics import Metrics
 
 if TYPE_CHECKING:
@@ -200,6 +202,11 @@ def _of_forward(status: "ForwardStatus") -> Iterator[Metric]:
 
 def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
     """`robot` is the id of a `[[robot]]`, "" where there is one without."""
+    panel = fleet.panel
+    robots = InfoMetricFamily("kiosk_robot", "The name of each [[robot]]", labels=["robot"])
+    for robot_id, title in panel.robot_names.items():
+        robots.add_metric([robot_id], {"name": render(title, panel.readers_languages[0])})
+    yield robots
     up = GaugeMetricFamily("kiosk_link_up", "1 while Zenoh has a link", labels=["robot"])
     bridges = GaugeMetricFamily("kiosk_bridges", "ROS 2 bridges seen", labels=["robot"])
     ready = GaugeMetricFamily("kiosk_ready", "1 while commands can reach the robot", labels=["robot"])

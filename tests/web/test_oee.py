@@ -4,7 +4,7 @@ answer and its change, the figures as a page, JSON and CSV."""
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
@@ -90,10 +90,12 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def figures(server: Server) -> dict[str, Any]:
+    """Of the only robot."""
     answer = server.http.get("/oee/figures")
     assert answer.status_code == 200, answer.text
     told: dict[str, Any] = answer.json()
-    return told
+    (robot,) = told.pop("robots")
+    return {**told, **robot}
 
 
 def ended(server: Server) -> list[dict[str, Any]]:
@@ -121,6 +123,7 @@ def test_the_figures_are_of_what_was_recorded(cell: Server) -> None:
     parts = (told["availability"], told["performance"], told["quality"])
     assert told["oee"] == pytest.approx(parts[0] * parts[1] * parts[2])
     assert told["not_recorded_s"] > 0
+    assert (told["robot"], told["name"]) == ("", "")
 
 
 def test_targets_are_marked(cell: Server) -> None:
@@ -216,7 +219,7 @@ def test_open_reasons_are_asked_together_before_the_shift_ends(tmp_path: Path) -
         assert give(server, first, "")["outcome"] == "succeeded"
         until(lambda: len(line()) > 1, "it is asked together", within_s=60)
         location = server.http.get("/stops/asked").headers["location"]
-        assert location == "/oee?shift=this&open=1"
+        assert location == "/oee?shift=this&open=1#stops"
         page = server.http.get(location).text
         listed = re.findall(r'class="answer" href="/stops/([a-z0-9-]+)#reasons"', page)
         assert first in listed
@@ -243,7 +246,7 @@ def test_open_reasons_of_all_robots_are_asked_together(tmp_path: Path) -> None:
         left = server.robot("left")
         until(lambda: robots() == {"left", "right"}, "both are asked together", within_s=60)
         address = server.http.get("/stops/asked").headers["location"]
-        assert re.fullmatch(r"/oee\?shift=this&robot=(left|right)&open=1#stops", address)
+        assert address == "/oee?shift=this&open=1#stops"
         line = re.search(r'data-text="times">([^<]+)<', server.http.get("/robots/left/pages/main").text)
         assert line
         assert re.fullmatch(r"Left: \d+, Right: \d+\. Say why before the shift ends\.", line[1])
@@ -260,6 +263,94 @@ def test_open_reasons_of_all_robots_are_asked_together(tmp_path: Path) -> None:
         until(lambda: robots() == {"left", "right"}, "both are asked about their next stops")
 
 
+# Which robots are chosen → those that each table is about, by id and by name.
+CHOSEN: Final = {
+    "": {"left": "Links", "right": "Rechts"},
+    "left": {"left": "Links"},
+    "right": {"right": "Rechts"},
+}
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """Both robots have stood still."""
+    with demo_server(tmp_path_factory.mktemp("two"), TWO_ROBOTS) as server:
+        server.http.headers["accept-language"] = "de"
+
+        def stood() -> bool:
+            robots = server.http.get("/oee/figures").json()["robots"]
+            return all(any(stop["ended"] and stop["key"] for stop in r["stops"]) for r in robots)
+
+        until(stood, "both have stood still", within_s=40)
+        yield server
+
+
+def _in_json(server: Server, query: str) -> dict[str, str]:
+    robots = server.http.get(f"/oee/figures{query}").json()["robots"]
+    assert all(robot["reasons"] and robot["stops"] for robot in robots)
+    return {robot["robot"]: robot["name"] for robot in robots}
+
+
+def _in_csv(server: Server, query: str) -> dict[str, str]:
+    text = server.http.get(f"/oee/stops.csv{query}").text.lstrip("\ufeff")
+    return {row["robot"]: row["name"] for row in csv.DictReader(io.StringIO(text))}
+
+
+def _in_page(path: str, pattern: str) -> Callable[[Server, str], dict[str, str]]:
+    """The names of robots beside which a table stands."""
+
+    def shown(server: Server, query: str) -> dict[str, str]:
+        names = dict.fromkeys(re.findall(pattern, server.http.get(f"{path}{query}").text))
+        return {id: name for id, name in CHOSEN[""].items() if name in names}
+
+    return shown
+
+
+TABLES: Final[dict[str, Callable[[Server, str], dict[str, str]]]] = {
+    "figures": _in_page("/oee", r'<h3 class="robot-name">([^<]+)</h3>'),
+    "longest stops": _in_page("/oee", r'class="of-robot"[^>]*>([^<]+)<'),
+    "states on paper": _in_page("/alarms/report", r'<svg class="state-times"[^>]*, ([^"]+)">'),
+    "list of stops": _in_page("/stops", r"</b><small>([^<]+)</small>"),
+    "JSON": _in_json,
+    "CSV": _in_csv,
+}
+
+
+@pytest.mark.parametrize("robot", CHOSEN)
+@pytest.mark.parametrize("table", TABLES)
+def test_a_table_is_about_the_chosen_robots_or_all(two: Server, table: str, robot: str) -> None:
+    query = f"?robot={robot}" if robot else ""
+    assert TABLES[table](two, query) == CHOSEN[robot]
+
+
+@pytest.mark.parametrize("path", ["/oee", "/oee/figures", "/oee/stops.csv", "/stops", "/alarms/report"])
+def test_a_robot_that_is_not_there_has_no_table(two: Server, path: str) -> None:
+    assert two.http.get(f"{path}?robot=middle").status_code == 404
+
+
+def test_the_choice_of_a_robot_stays(two: Server) -> None:
+    """The other shifts, the other table of stops and the CSV are of the chosen robot too."""
+    page = two.http.get("/oee?robot=left").text
+    main = page[page.index('<main class="oee">') :]
+    links = [link for link in re.findall(r'href="(/oee[^"]*)"', main) if "shift" in link]
+    others = [link for link in links if "robot=left" not in link]
+    assert others == ["/oee?shift=this", "/oee?shift=this&amp;robot=right"]
+
+
+def test_prometheus_has_each_robot_with_its_name(two: Server) -> None:
+    text = two.http.get("/metrics").text
+    for robot, name in (("left", "Left"), ("right", "Right")):
+        assert f'kiosk_robot_info{{name="{name}",robot="{robot}"}} 1.0' in text
+        assert f'kiosk_shift_availability{{robot="{robot}"}} ' in text
+
+
+def test_the_story_of_a_stop_names_its_robot(two: Server) -> None:
+    for robot in two.http.get("/oee/figures").json()["robots"]:
+        key = robot["stops"][0]["key"]
+        stop = two.http.get(f"/stops/{key}/story.json").json()["stop"]
+        assert (stop["robot"], stop["robot_name"]) == (robot["robot"], robot["name"])
+
+
 def test_who_may_not_answer_is_told_why(tmp_path: Path) -> None:
     panel = PANEL.replace("[oee]", '[oee]\nneeds = "maintenance"')
     add_user(tmp_path, "ann", "operator", pin=PIN)
@@ -268,8 +359,8 @@ def test_who_may_not_answer_is_told_why(tmp_path: Path) -> None:
         ann = browsers.signed_in(server.url, "ann", pin=PIN)
 
         def keys() -> list[str]:
-            told = ann.get("/oee/figures").json()
-            return [stop["key"] for stop in told["stops"] if stop["key"]]
+            (robot,) = ann.get("/oee/figures").json()["robots"]
+            return [stop["key"] for stop in robot["stops"] if stop["key"]]
 
         until(keys, "the machine has stood still", within_s=20)
         answer = ann.post(f"/stops/{keys()[0]}/reason", json={"reason": "material"})

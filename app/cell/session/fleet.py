@@ -307,6 +307,13 @@ class Fleet:
         """The session of the robot with this id; the first for another id, and for a robot without."""
         return self._sessions.get(robot_id, self.first)
 
+    def chosen(self, robot: str) -> list[RobotSession]:
+        """The sessions that a table is about, by `robot` in the query of its page, print, CSV and JSON:
+        of the robot with this id, or of all for "". NotFound for another id."""
+        if not robot:
+            return [*self.sessions]
+        return [self.session(robot)]
+
     def session_for(self, session: RobotSession, widget: str) -> RobotSession:
         """The session of a widget on a page of `session`: that of the widget's own robot if it has
         one."""

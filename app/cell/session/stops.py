@@ -13,6 +13,7 @@ from app.cell.alarms.report import CountRow, read_counts, read_states, shift_at
 from app.cell.alarms.shown import AskedReason, OpenStop
 from app.cell.commands.shift_acts import REASON_ACTION
 from app.cell.session.fleet import Fleet
+from app.cell.session.session import RobotSession
 from app.cell.session.state_recorder import ASK_BEFORE_END_S
 from app.cell.stops.changes import Change, ChangeFilter, read_changes
 from app.cell.stops.oee import (
@@ -27,15 +28,13 @@ from app.cell.stops.oee import (
     Standstill,
     answer_of,
     answered,
-    break_spans,
+    is_short_stop,
     open_stops,
     quantities,
     shift_figures,
     spells,
     standstills,
     stop_key,
-    total,
-    without,
 )
 from app.cell.stops.sources import (
     PanelNames,
@@ -271,12 +270,12 @@ def _stood(
 
 
 def ask_reason(fleet: Fleet, robot: str, since: float, until: float) -> None:
-    """Asks why a robot stood still from `since` to `until`, unless it was short or a break: shortly
-    before the shift ends together with what is asked of other robots, else in its place."""
+    """Asks why a robot stood still from `since` to `until`, unless it was short: shortly before
+    the shift ends together with what is asked of other robots, else in its place."""
     rules, span = fleet.panel.oee, Span(since, until)
     if rules is None or not rules.reasons:
         return
-    if total(without(span, break_spans(span, rules.breaks))) < rules.reason_after_s:
+    if is_short_stop([span], rules.breaks, rules.reason_after_s):
         return
     names, stops = fleet.panel.robot_names, [OpenStop(robot=robot, began=since)]
     question = fleet.alarms.asked
@@ -299,7 +298,7 @@ async def ask_open_reasons(fleet: Fleet, log: OperatorLog | NullLog, now: float)
     """Asks before the end of a shift for the reasons of the stops of all robots that have none, as
     those that were left for later. LogError and TooMany as of `figures_of`."""
     shift = shift_at(now, fleet.panel.alarm_rules.shifts)
-    figures = await figures_of_all(fleet, log, shift.since, now)
+    figures = await figures_of(fleet, log, fleet.sessions, shift.since, now)
     stops = [
         OpenStop(robot=robot, began=time.stop.standstill.since) for robot, time in open_stops(figures)
     ]
@@ -339,27 +338,25 @@ def reason_given(fleet: Fleet, robot: str, since: float) -> None:
         fleet.alarms.ask(rest if stops else None)
 
 
-async def figures_of_all(
-    fleet: Fleet, log: OperatorLog | NullLog, since: float, until: float
-) -> dict[str, ShiftFigures]:
-    """Those of each robot whose panel has `[oee]`, by its id, "" for the only one. Errors as of
-    `figures_of`."""
-    counted = [session.entry for session in fleet.sessions if session.panel.oee is not None]
-    robots = [str(entry.id) if entry else "" for entry in counted]
-    return {robot: await figures_of(fleet, log, robot, since, until) for robot in robots}
-
-
 async def figures_of(
-    fleet: Fleet, log: OperatorLog | NullLog, robot: str, since: float, until: float
-) -> ShiftFigures:
-    """The figures of a robot ("" for the first) from `since` on and before `until`, in seconds since
-    the epoch. LogError if the stores can't be read, TooMany if too many searches run."""
+    fleet: Fleet,
+    log: OperatorLog | NullLog,
+    sessions: Sequence[RobotSession],
+    since: float,
+    until: float,
+) -> dict[str, ShiftFigures]:
+    """The figures of robots from `since` on and before `until`, in seconds since the epoch, by the
+    robot's id, "" for the only one. LogError if the stores can't be read, TooMany if too many searches
+    run."""
     reader, span = StopReader(stores_of(fleet, log)), Span(since, until)
-    entry = fleet.of_robot(robot).entry
-    name = entry.id if entry else ""
-    recorded, stops = await reader.standstills(name, since, until)
-    rows = await reader.counts(name, since, until)
-    rules, states = fleet.panel.oee, fleet.panel.state
+    robots = [session.entry.id if session.entry else "" for session in sessions]
+    return {robot: await _figures_of(fleet.panel, reader, robot, span) for robot in robots}
+
+
+async def _figures_of(panel: Panel, reader: StopReader, robot: str, span: Span) -> ShiftFigures:
+    recorded, stops = await reader.standstills(robot, *span)
+    rows = await reader.counts(robot, *span)
+    rules, states = panel.oee, panel.state
     if rules is None or states is None:
         return shift_figures(span, [], [], quantities([], (), span), Plan(()))
     plan = Plan(

@@ -79,7 +79,8 @@ class AnsweredStop(NamedTuple):
 
 
 class StopTime(NamedTuple):
-    """How long a stop was in a shift, without its breaks. `is_short`: its reason is not asked."""
+    """How long a stop was in a shift, without its breaks. `is_short`: its reason is not asked
+    (`is_short_stop`), and none was given."""
 
     stop: AnsweredStop
     seconds: float
@@ -392,8 +393,19 @@ def _stop_time(stop: AnsweredStop, span: Span, breaks: Sequence[Span], plan: Pla
 
     parts = [part for each in stop.standstill.spans for part in overlaps(each, [span])]
     worked = total(rest for part in parts for rest in without(part, breaks))
-    is_short = total(stop.standstill.spans) < plan.reason_after_s and not stop.reason
+    is_short = not stop.reason and is_short_stop(
+        stop.standstill.spans, plan.breaks, plan.reason_after_s
+    )
     return StopTime(stop, worked, is_short)
+
+
+def is_short_stop(spans: Sequence[Span], breaks: Sequence[str], reason_after_s: float) -> bool:
+    """Whether no reason is asked of a standstill: without its breaks it is shorter than
+    `reason_after_s`."""
+    if total(spans) < reason_after_s:
+        return True
+    worked = (rest for span in spans for rest in without(span, break_spans(span, breaks)))
+    return total(worked) < reason_after_s
 
 
 def pareto(stops: Iterable[StopTime]) -> Iterator[ReasonTime]:

@@ -224,7 +224,8 @@ def _add_story(
         templates = PageTemplates(shipped_path("templates"), compiled=shipped_path(COMPILED))
         html = templates.render(TEMPLATE, language, panel=panel, **context)
         parcel.add(names[0], "why the machine stopped, to read and to print", html)
-        parcel.add_json(names[1], "the same for programs", story_answer(story, end, language))
+        answer = story_answer(story, robots.get(story.stop.robot, ""), end, language)
+        parcel.add_json(names[1], "the same for programs", answer)
 
 
 async def _told(reader: StopReader, key: str) -> tuple[Story, float | None]:

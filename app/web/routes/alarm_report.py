@@ -52,7 +52,7 @@ SHIFT_WORDS: Final = ("alarms_report_this", "alarms_report_last", "alarms_report
 
 class ReportQuery(BaseModel):
     """The time of the report: a shift, or from `since` on and before `until` if one of these is there.
-    `robot` is the one whose states are shown, by default the first."""
+    `robot` is the id of the one whose states are shown; "" shows those of all."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -117,6 +117,14 @@ class ShownPeriod(NamedTuple):
     width: float
 
 
+class RobotStates(NamedTuple):
+    """The states of one robot. `robot` is its name, "" for the panel's only one."""
+
+    robot: TextLike
+    states: list[ShownState]
+    periods: list[ShownPeriod]
+
+
 class ReportRow(NamedTuple):
     """A row of a table: `cells` beside the first."""
 
@@ -132,11 +140,10 @@ class ReportContext(TypedDict):
     form: ReportQuery
     typed: dict[str, str]
     shifts: list[tuple[Text, TextLike, str, bool]]
-    robots: dict[str, TextLike]
+    robots: Mapping[str, TextLike]
     span: Text
     figures: list[tuple[TextLike, TextLike, TextLike]]
-    states: list[ShownState]
-    periods: list[ShownPeriod]
+    states: list[RobotStates]
     marks: list[TextLike]
     frequent: list[ReportRow]
     high: list[ReportRow]
@@ -151,12 +158,12 @@ class ReportContext(TypedDict):
 
 
 class ReportParts(NamedTuple):
-    """What a report is made of: `rows` are entries of the operator's log, the newest first, and
-    `messages` those of its messages, also of the shift before."""
+    """What a report is made of: `states` are those of each robot by its id, `rows` are entries of the
+    operator's log, the newest first, and `messages` those of its messages, also of the shift before."""
 
     figures: Figures
     alarms: AlarmReport
-    states: Sequence[StatePeriod]
+    states: Mapping[str, Sequence[StatePeriod]]
     rows: Sequence[LogRow]
     messages: Sequence[LogRow] = ()
 
@@ -166,7 +173,8 @@ def report_context(
 ) -> ReportContext:
     """The report of a time."""
     end = min(shift.until, now)
-    fills = _fills(parts.states)
+    fills = _fills(period for periods in parts.states.values() for period in periods)
+    names = panel.robot_names if len(panel.robots) > 1 else {}
     presses = [row for row in parts.rows if row.entry.kind not in LEFT_OUT]
     alarms = parts.alarms
     high_more = alarms.high_count - len(alarms.high)
@@ -183,13 +191,19 @@ def report_context(
             for back, name in enumerate(SHIFTS)
             for chosen in [name == form.shift and not form.has_times]
         ],
-        robots=panel.robot_names,
+        robots=names,
         span=span_text(shift),
         figures=list(_figures(parts.figures, len(presses))),
-        states=list(_durations(parts.states, fills)),
-        periods=[
-            ShownPeriod(fills[period.state], *_place(period, shift.since, end))
-            for period in parts.states
+        states=[
+            RobotStates(
+                names.get(robot, ""),
+                list(_durations(periods, fills)),
+                [
+                    ShownPeriod(fills[period.state], *_place(period, shift.since, end))
+                    for period in periods
+                ],
+            )
+            for robot, periods in parts.states.items()
         ],
         marks=[clock_text(shift.since + n * (end - shift.since) / MARKS) for n in range(MARKS + 1)],
         frequent=[
@@ -369,7 +383,7 @@ class MessageReceipt(ActAnswer):
     "/alarms/report",
     response_class=HTMLResponse,
     summary="The shift report: alarms, presses and states of the machine in a time",
-    responses=errors(403, 422, 429, 503),
+    responses=errors(403, 404, 422, 429, 503),
 )
 async def report(
     request: Request, state: CurrentState, form: Annotated[ReportQuery, Query()]
@@ -427,13 +441,15 @@ async def _messages(state: AppState, before: Shift, shift: Shift) -> list[LogRow
     return [row for row in rows if row.entry.action == SHIFT_ACTION]
 
 
-async def _states(state: AppState, robot: str, since: float, until: float) -> list[StatePeriod]:
-    """The states of a robot, or else of the first; none if the panel has no `[state]`."""
-    if state.fleet.panel.state is None or state.fleet.states is None:
-        return []
-    first = state.fleet.first.entry
-    name = robot or (first.id if first else "")
-    return await asyncio.to_thread(read_states, state.fleet.states, name, since, until)
+async def _states(
+    state: AppState, robot: str, since: float, until: float
+) -> dict[str, list[StatePeriod]]:
+    """The states of the chosen robots by their ids; none if the panel has no `[state]`."""
+    file, sessions = state.fleet.states, state.fleet.chosen(robot)
+    if state.fleet.panel.state is None or file is None:
+        return {}
+    robots = [session.entry.id if session.entry else "" for session in sessions]
+    return {id: await asyncio.to_thread(read_states, file, id, since, until) for id in robots}
 
 
 async def _log_rows(state: AppState, shift: Shift) -> list[LogRow]:

@@ -97,10 +97,8 @@ async def _read_shift(state: AppState, fleet: Fleet) -> None:
         return
     metrics.shift_at, metrics.shift = now, {}
     since = shift_at(now, fleet.panel.alarm_rules.shifts).since
-    for session in fleet.sessions:
-        robot = session.entry.id if session.entry else ""
-        with suppress(LogError, TooMany):
-            metrics.shift[robot] = await figures_of(fleet, state.log, robot, since, now)
+    with suppress(LogError, TooMany):
+        metrics.shift = await figures_of(fleet, state.log, fleet.sessions, since, now)
 
 
 def _exposition() -> Callable[[Metrics], tuple[bytes, str]]:

@@ -1,8 +1,9 @@
 """The figures of a shift: a page to be printed, JSON and CSV."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Final, Literal, NamedTuple, TypedDict
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
@@ -10,7 +11,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.cell.alarms.records import text_of
 from app.cell.alarms.report import Shift, shift_at
-from app.cell.session.stops import figures_of, figures_of_all
+from app.cell.session.stops import figures_of
 from app.cell.stops.oee import (
     NOT_ANSWERED,
     SHORT,
@@ -41,14 +42,18 @@ MINUTE_S: Final = 60.0
 
 
 class OeeQuery(BaseModel):
-    """`robot` is the one whose figures are shown, by default the first. With `open` the page lists the
-    stops of all robots whose reason is not known, else the longest of this one."""
+    """`robot` is the id of the one whose figures are shown; "" shows those of all. With `open` the page
+    lists their stops whose reason is not known, else the longest."""
 
     model_config = ConfigDict(extra="forbid")
 
     shift: Literal["this", "last", "previous"] = "this"
     robot: Annotated[str, Field(max_length=64)] = ""
     open: Literal["", "1"] = ""
+
+    def address(self) -> str:
+        """The shift and the robot as the query of an address."""
+        return urlencode({"shift": self.shift} | ({"robot": self.robot} if self.robot else {}))
 
 
 class Figure(NamedTuple):
@@ -95,10 +100,22 @@ class ShownStop(NamedTuple):
 
 
 class ListedStops(NamedTuple):
-    """The stops of one robot in the table. `robot` is its name, "" where no others can be listed."""
+    """The stops of one robot in the table. `robot` is its name, "" for the panel's only one."""
 
     robot: TextLike
     stops: list[ShownStop]
+
+
+class RobotShown(NamedTuple):
+    """The figures of one robot. `robot` is its name, "" for the panel's only one."""
+
+    robot: TextLike
+    oee: Figure
+    parts: list[Figure]
+    bands: list[ShownBand]
+    summed: TextLike
+    reasons: list[ShownReason]
+    lacks: list[TextLike]
 
 
 class OeeContext(TypedDict):
@@ -106,18 +123,14 @@ class OeeContext(TypedDict):
 
     form: OeeQuery
     shifts: list[tuple[Text, TextLike, str, bool]]
-    robots: dict[str, TextLike]
+    robots: Mapping[str, TextLike]
     span: Text
-    index: Figure
-    parts: list[Figure]
-    bands: list[ShownBand]
+    shown: list[RobotShown]
     marks: list[TextLike]
-    summed: TextLike
-    reasons: list[ShownReason]
     table: TextLike
     has_open: bool
     listed: list[ListedStops]
-    lacks: list[TextLike]
+    query: str
     alarm_word: Any
     word: Any
 
@@ -157,12 +170,12 @@ class TargetsAnswer(BaseModel):
     oee: float | None
 
 
-class OeeAnswer(BaseModel):
-    """The figures of a shift up to now, with the names of ISO 22400-2; null is not known. Times in
-    seconds."""
+class RobotFigures(BaseModel):
+    """The figures of a robot, with the names of ISO 22400-2; null is not known. Times in seconds.
+    `robot` is its id and `name` its name, both "" for a panel without `[[robot]]`."""
 
-    since: AwareDatetime
-    until: AwareDatetime
+    robot: str
+    name: str
     planned_busy_time_s: float
     actual_production_time_s: float
     actual_unit_down_time_s: float
@@ -175,9 +188,17 @@ class OeeAnswer(BaseModel):
     performance: float | None
     quality: float | None
     oee: float | None
-    targets: TargetsAnswer
     reasons: list[ReasonAnswer]
     stops: list[StopAnswer]
+
+
+class OeeAnswer(BaseModel):
+    """A shift up to now, with the figures of each robot."""
+
+    since: AwareDatetime
+    until: AwareDatetime
+    targets: TargetsAnswer
+    robots: list[RobotFigures]
 
 
 def word(name: str, **about: Any) -> Text:
@@ -195,11 +216,8 @@ async def oee_page(
 ) -> Response:
     now = time.time()
     rules, shift, figures = await _figures(state, form, now)
-    path = f"/oee?shift={form.shift}" + (f"&robot={form.robot}" if form.robot else "")
-    page = FramedPage("oee.html", word("title"), path, "alarms")
-    listed = await _listed(state, form, rules, shift, figures, now)
-    context = oee_context(state, form, rules, shift, figures, listed, now)
-    return framed_page(request, state, page, context)
+    page = FramedPage("oee.html", word("title"), f"/oee?{form.address()}", "alarms")
+    return framed_page(request, state, page, oee_context(state, form, rules, shift, figures, now))
 
 
 @router.get(
@@ -211,8 +229,9 @@ async def oee_page(
 async def oee_figures(
     request: Request, state: CurrentState, form: Annotated[OeeQuery, Query()]
 ) -> Response:
-    rules, _, figures = await _figures(state, form, time.time())
-    content = localized(figures_json(rules, figures), caller_of(request).language)
+    now, names = time.time(), state.fleet.panel.robot_names
+    rules, shift, figures = await _figures(state, form, now)
+    content = localized(figures_json(rules, shift, figures, names, now), caller_of(request).language)
     return JSONResponse(content, headers={"cache-control": "no-store"})
 
 
@@ -227,9 +246,13 @@ async def oee_stops(
 ) -> Response:
     rules, _, figures = await _figures(state, form, time.time())
     language = caller_of(request).language
-    columns = list(StopAnswer.model_fields)
-    stops = [_stop_json(rules, stop) for stop in figures.stops]
-    rows = [[_cell(stop[name], language) for name in columns] for stop in stops]
+    names, columns = state.fleet.panel.robot_names, list(StopAnswer.model_fields)
+    rows = [
+        [_cell(value, language) for value in (robot, names.get(robot, ""), *map(stop.get, columns))]
+        for robot, of_robot in figures.items()
+        for stop in (_stop_json(rules, each) for each in of_robot.stops)
+    ]
+    columns = ["robot", "name", *columns]
     headers = {"content-disposition": 'attachment; filename="stops.csv"', "cache-control": "no-store"}
     return Response(csv_text(columns, rows), media_type="text/csv", headers=headers)
 
@@ -239,38 +262,32 @@ def _cell(value: Any, language: str) -> Any:
     return text_cell(str(localized(value, language))) if is_text else value
 
 
-async def _figures(state: AppState, form: OeeQuery, now: float) -> tuple[OeeRules, Shift, ShiftFigures]:
-    panel = state.fleet.panel
+async def _figures(
+    state: AppState, form: OeeQuery, now: float
+) -> tuple[OeeRules, Shift, dict[str, ShiftFigures]]:
+    """The figures of the chosen robots up to now, by the robot's id."""
+    panel, sessions = state.fleet.panel, state.fleet.chosen(form.robot)
     if panel.oee is None or panel.state is None:
         raise NotFound("this panel has no [oee]")
     shift = shift_at(now, panel.alarm_rules.shifts, SHIFTS.index(form.shift))
-    figures = await figures_of(state.fleet, state.log, form.robot, shift.since, min(shift.until, now))
-    return panel.oee, shift, figures
+    until = min(shift.until, now)
+    return panel.oee, shift, await figures_of(state.fleet, state.log, sessions, shift.since, until)
 
 
-async def _listed(
-    state: AppState,
+def _listed(
     form: OeeQuery,
     rules: OeeRules,
-    shift: Shift,
-    figures: ShiftFigures,
-    now: float,
-) -> list[ListedStops]:
-    """The table of stops: of all robots those without a reason, or the longest of the one in
-    `figures`."""
-    names = state.fleet.panel.robot_names
-    listed: list[tuple[TextLike, Sequence[StopTime]]]
-    listed = [("", figures.open if form.open else figures.longest)]
-    if form.open and len(names) > 1:
-        until = min(shift.until, now)
-        opened = open_stops(await figures_of_all(state.fleet, state.log, shift.since, until))
-        listed = [
-            (name, [stop.time for stop in opened if stop.robot == robot])
-            for robot, name in names.items()
-        ]
-    return [
-        ListedStops(robot, [_shown(stop, rules) for stop in stops]) for robot, stops in listed if stops
-    ]
+    figures: Mapping[str, ShiftFigures],
+    names: Mapping[str, TextLike],
+) -> Iterator[ListedStops]:
+    """The table of stops: those without a reason, or the longest of each robot."""
+    opened = open_stops(figures)
+    for robot, of_robot in figures.items():
+        stops: Sequence[StopTime] = of_robot.longest
+        if form.open:
+            stops = [stop.time for stop in opened if stop.robot == robot]
+        if stops:
+            yield ListedStops(names.get(robot, ""), [_shown(stop, rules) for stop in stops])
 
 
 def oee_context(
@@ -278,24 +295,40 @@ def oee_context(
     form: OeeQuery,
     rules: OeeRules,
     shift: Shift,
-    figures: ShiftFigures,
-    listed: list[ListedStops],
+    figures: Mapping[str, ShiftFigures],
     now: float,
 ) -> OeeContext:
-    """The page of a shift up to now."""
+    """The page of a shift up to now, with the figures of robots by their ids."""
     panel = state.fleet.panel
     starts = panel.alarm_rules.shifts
-    whole = max(1.0, figures.until - figures.since)
-    down, count = _minutes(figures.down_s), number(str(len(figures.stops)))
+    # A name tells robots apart: the only one of a panel needs none.
+    names = panel.robot_names if len(panel.robots) > 1 else {}
+    passed = min(shift.until, now) - shift.since
     return OeeContext(
         form=form,
         shifts=[
             (say(SHIFT_WORDS[back]), span_text(shift_at(now, starts, back)), name, name == form.shift)
             for back, name in enumerate(SHIFTS)
         ],
-        robots=panel.robot_names,
+        robots=names,
         span=span_text(shift),
-        index=_figure("index", figures.oee, _good(figures), rules.target),
+        shown=[_robot_shown(names.get(robot, ""), each, rules) for robot, each in figures.items()],
+        marks=[clock_text(shift.since + n * passed / MARKS) for n in range(MARKS + 1)],
+        table=word("open" if form.open else "longest"),
+        has_open=any(each.open for each in figures.values()),
+        listed=list(_listed(form, rules, figures, names)),
+        query=form.address(),
+        alarm_word=alarm_word,
+        word=word,
+    )
+
+
+def _robot_shown(name: TextLike, figures: ShiftFigures, rules: OeeRules) -> RobotShown:
+    whole = max(1.0, figures.until - figures.since)
+    down, count = _minutes(figures.down_s), number(str(len(figures.stops)))
+    return RobotShown(
+        name,
+        oee=_figure("index", figures.oee, _good(figures), rules.target),
         parts=list(_parts(figures, rules)),
         bands=[
             ShownBand(
@@ -305,15 +338,9 @@ def oee_context(
             )
             for band in figures.bands
         ],
-        marks=[clock_text(figures.since + n * whole / MARKS) for n in range(MARKS + 1)],
         summed=word("sum", minutes=down, count=count) if figures.stops else "",
         reasons=list(_reasons(figures.reasons, rules)),
-        table=word("open" if form.open else "longest"),
-        has_open=bool(figures.open) or len(panel.robots) > 1,
-        listed=listed,
         lacks=list(_lacks(figures)),
-        alarm_word=alarm_word,
-        word=word,
     )
 
 
@@ -405,11 +432,35 @@ def _lacks(figures: ShiftFigures) -> Iterator[TextLike]:
         yield word("uncounted", part=part, whole=whole)
 
 
-def figures_json(rules: OeeRules, figures: ShiftFigures) -> dict[str, Any]:
-    """The figures as JSON, with texts that are not rendered yet."""
+def figures_json(
+    rules: OeeRules,
+    shift: Shift,
+    figures: Mapping[str, ShiftFigures],
+    names: Mapping[str, TextLike],
+    now: float,
+) -> dict[str, Any]:
+    """The figures of robots by their ids as JSON, with texts that are not rendered yet."""
     return {
-        "since": iso_time(figures.since),
-        "until": iso_time(figures.until),
+        "since": iso_time(shift.since),
+        "until": iso_time(min(shift.until, now)),
+        "targets": {
+            name: None if target is None else target / 100
+            for name, target in (
+                ("availability", rules.target_availability),
+                ("performance", rules.target_performance),
+                ("quality", rules.target_quality),
+                ("oee", rules.target),
+            )
+        },
+        "robots": [
+            {"robot": robot, "name": names.get(robot, ""), **_robot_json(rules, each)}
+            for robot, each in figures.items()
+        ],
+    }
+
+
+def _robot_json(rules: OeeRules, figures: ShiftFigures) -> dict[str, Any]:
+    return {
         "planned_busy_time_s": figures.busy_s,
         "actual_production_time_s": figures.running_s,
         "actual_unit_down_time_s": figures.down_s,
@@ -422,15 +473,6 @@ def figures_json(rules: OeeRules, figures: ShiftFigures) -> dict[str, Any]:
         "performance": figures.performance,
         "quality": figures.quality,
         "oee": figures.oee,
-        "targets": {
-            name: None if target is None else target / 100
-            for name, target in (
-                ("availability", rules.target_availability),
-                ("performance", rules.target_performance),
-                ("quality", rules.target_quality),
-                ("oee", rules.target),
-            )
-        },
         "reasons": [{**row._asdict(), "text": _label(row.reason, rules)} for row in figures.reasons],
         "stops": [_stop_json(rules, stop) for stop in figures.stops],
     }

@@ -205,16 +205,18 @@ def word(name: str, **about: Any) -> Text:
     "/stops",
     response_class=HTMLResponse,
     summary="The stops of the last week, the newest first",
-    responses=errors(403, 422, 429, 503),
+    responses=errors(403, 404, 422, 429, 503),
 )
 async def stops(
     request: Request, state: CurrentState, query: Annotated[StopsQuery, Query()]
 ) -> Response:
-    now = time.time()
+    now, robots = time.time(), state.fleet.panel.robot_names
+    state.fleet.chosen(query.robot)
     newest = await _reader(state).stops(now - DAYS_S, now + 1.0, query.robot or None)
-    page = FramedPage("stops.html", word("list"), "/stops", "alarms")
+    path = f"/stops?robot={quote(query.robot)}" if query.robot else "/stops"
+    page = FramedPage("stops.html", word("list"), path, "alarms")
     context = {
-        "days": list(_by_day(newest)), "robots": state.fleet.panel.robot_names, "word": word,
+        "days": list(_by_day(newest)), "robots": robots, "chosen": query.robot, "word": word,
         "alarm_word": alarm_word, "log_word": log_word,
     }  # fmt: skip
     return framed_page(request, state, page, context)
@@ -266,13 +268,10 @@ async def asked(state: CurrentState) -> Response:
 
 
 def _list_of(state: AppState, question: AskedReason) -> str:
-    """The page with the stops of a shift that have no reason, and the figures of the robot that had the
-    newest one."""
+    """The page with the stops of a shift that have no reason."""
     now, starts, ends = time.time(), state.fleet.panel.alarm_rules.shifts, question["shift_ends"]
     shift = next((name for n, name in enumerate(SHIFTS) if shift_at(now, starts, n).since < ends), "")
-    path = f"/oee?shift={shift or SHIFTS[-1]}"
-    newest = question["stops"][-1]["robot"]
-    return f"{path}&robot={quote(newest)}&open=1#stops" if newest else f"{path}&open=1"
+    return f"/oee?shift={shift or SHIFTS[-1]}&open=1#stops"
 
 
 @router.post(
@@ -337,7 +336,8 @@ async def story_json(request: Request, state: CurrentState, key: Key) -> JSONRes
     reader = _reader(state)
     story = await reader.story(*sort_and_number(key))
     end = await reader.end_of(story.stop)
-    answer = story_answer(story, end, caller_of(request).language)
+    name = state.fleet.panel.robot_names.get(story.stop.robot, "")
+    answer = story_answer(story, name, end, caller_of(request).language)
     recording = await _recording(state, story.stop)
     answer["recording"] = recording and {
         "path": f"{state.root}{recording.path}",
@@ -574,8 +574,9 @@ def advice_of(event: Event, names: PanelNames) -> tuple[TextLike, TextLike] | No
     return (condition.action, "") if condition and condition.action else None
 
 
-def story_answer(story: Story, end: float | None, language: str) -> dict[str, Any]:
-    """A story for programs: times are RFC 3339, offsets seconds from its zero."""
+def story_answer(story: Story, name: TextLike, end: float | None, language: str) -> dict[str, Any]:
+    """A story for programs: times are RFC 3339, offsets seconds from its zero. `name` is that of the
+    robot that stopped, "" for a panel without `[[robot]]`."""
     stop, first = story.stop, story.first
 
     def text(value: TextLike) -> str:
@@ -587,6 +588,7 @@ def story_answer(story: Story, end: float | None, language: str) -> dict[str, An
             "sort": stop.sort,
             "id": stop.id,
             "robot": stop.robot,
+            "robot_name": text(name),
             "text": text(stop.text),
             "at": iso_time(stop.at),
             "end": None if end is None else iso_time(end),

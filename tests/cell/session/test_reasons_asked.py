@@ -56,10 +56,10 @@ TOGETHER: Final = {
 }  # fmt: skip
 
 
-def fleet_of(robots: int) -> Fleet:
-    """On an event loop only."""
+def fleet_of(robots: int, **oee: Any) -> Fleet:
+    """On an event loop only. `oee` are further keys of the panel's `[oee]`."""
     entries = [{"id": id, "name": name, "namespace": f"/{id}"} for id, name in NAMES[robots].items()]
-    panel = panel_of(languages=["en", "de", "ja"], state=STATE, oee=OEE, robot=entries)
+    panel = panel_of(languages=["en", "de", "ja"], state=STATE, oee=OEE | oee, robot=entries)
     return Fleet(panel, lambda _: config_to(NOWHERE), "r1", NullLog())
 
 
@@ -138,6 +138,20 @@ def test_the_question_changes(case: str) -> None:
         asked = fleet.alarms.asked
         named = asked and [(stop["robot"], stop["began"]) for stop in asked["stops"]]
         assert named == after
+        await fleet.stop()
+
+    asyncio.run(scene())
+
+
+def test_a_break_is_no_stop_that_is_asked() -> None:
+    """The rule is `is_short_stop`, in tests/cell/stops/test_oee.py."""
+
+    async def scene() -> None:
+        fleet = fleet_of(0, breaks=["09:30-09:45"])
+        begin = datetime(2026, 6, 1, 9, 30).timestamp()
+        for lasted_s, is_asked in ((930.0, False), (960.0, True)):
+            ask_reason(fleet, "", begin, begin + lasted_s)
+            assert bool(fleet.alarms.asked) is is_asked
         await fleet.stop()
 
     asyncio.run(scene())

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
 
@@ -26,6 +26,7 @@ from app.cell.stops.oee import (
     answered,
     break_spans,
     counted,
+    is_short_stop,
     open_stops,
     quantities,
     shift_figures,
@@ -137,6 +138,39 @@ def test_a_break_in_which_the_machine_runs_is_worked() -> None:
     half = begin + 1800 + 450
     worked = figures([(begin, half, RUN), (half, begin + 3600, WAIT)], (), NO_COUNT, plan, shift)
     assert (worked.running_s, worked.planned_s, worked.down_s) == (2250.0, 450.0, 900.0)
+
+
+# From when to when a machine stood still, in minutes after 9 o'clock → whether its reason is asked.
+# There is a break from 9:30 to 9:45; a stop is short below a minute.
+ASKED: Final[dict[str, tuple[list[tuple[float, float]], bool]]] = {
+    "short": ([(10.0, 10.9)], False),
+    "a minute": ([(10.0, 11.0)], True),
+    "in the break": ([(31.0, 44.0)], False),
+    "the break": ([(30.0, 45.0)], False),
+    "ends soon after the break": ([(30.0, 45.5)], False),
+    "begins soon before it": ([(29.5, 45.0)], False),
+    "soon before and soon after it": ([(29.5, 45.5)], True),
+    "goes on after it": ([(30.0, 46.0)], True),
+    "in two parts, one in the break": ([(29.5, 40.0), (42.0, 45.4)], False),
+    "in two parts": ([(10.0, 10.5), (11.0, 11.5)], True),
+}
+
+
+@pytest.mark.parametrize("case", ASKED)
+def test_one_rule_says_whether_the_reason_of_a_stop_is_asked(case: str) -> None:
+    """The list of open stops, and the question that follows a stop."""
+    minutes, is_asked = ASKED[case]
+    nine, breaks = datetime(2026, 6, 1, 9, 0).timestamp(), ("09:30-09:45",)
+    spans = [Span(*(nine + 60 * minute for minute in each)) for each in minutes]
+    assert is_short_stop(spans, breaks, 60.0) is not is_asked
+    periods = [(*span, WAIT) for span in spans]
+    shift = Span(nine, nine + 3600)
+    runs = (spans[-1].until, shift.until, RUN)
+    plan = PLAN._replace(breaks=breaks)
+    of_shift = figures([*periods, runs], (), NO_COUNT, plan, shift)
+    assert bool(of_shift.open) is is_asked
+    answered_too = figures([*periods, runs], ("material",), NO_COUNT, plan, shift)
+    assert [stop.is_short for stop in answered_too.stops] == [False] * len(answered_too.stops)
 
 
 # Values of a counter each minute → how many parts they are; None: not recorded.
