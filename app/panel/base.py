@@ -33,8 +33,7 @@ from app.ros.messages.names import (
 )
 from app.ros.messages.validation import format_value
 from app.system.errors import InterfaceError
-from app.system.icons import icons
-from app.system.pictures import picture_files
+from app.system.pictures import icons, picture_files
 from app.system.public import PUBLIC, PUBLIC_ENDPOINT, PUBLIC_FIELD
 from app.system.texts import ENGLISH, PanelText, TextLike, render, say
 

@@ -17,8 +17,8 @@ from markupsafe import Markup
 
 from app.panel.file.wording import closest_name, list_names
 from app.panel.layout import Page
-from app.system.icons import icons
 from app.system.page_process import BYTES, NAME, SECONDS, Answer, PageRequest
+from app.system.pictures import icons
 from app.system.texts import ENGLISH, render
 from app.system.worker import Limits, Worker, WorkerError
 

@@ -18,6 +18,7 @@ from app.records.entry import FIELDS, Entry
 from app.records.store import COLUMNS
 from app.system.errors import LogError
 from app.system.settings import Settings
+from app.system.whole_file import write_whole
 
 # Compares the operator's log with its copy: the file of `KIOSK_LOG_COPY`, or what a syslog server has
 # written. A copy has one entry a line, as JSON; other lines are left out.
@@ -272,12 +273,8 @@ class Position:
         return int(seq), str(digest)
 
     def save(self, seq: int, digest: str) -> None:
-        new = self._path.with_suffix(".new")
         with suppress(OSError):  # then more entries are sent again
-            fd = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
-            with open(fd, "w", encoding="ascii") as file:
-                json.dump([seq, digest], file)
-            new.replace(self._path)
+            write_whole(self._path, json.dumps([seq, digest]).encode(), durable=False)
 
 
 class LogCopier:

@@ -3,7 +3,6 @@
 import base64
 import json
 import logging
-import os
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ from app.records.entry import Entry, new_entry
 from app.records.store import Store
 from app.system.errors import LogError
 from app.system.texts import say
+from app.system.whole_file import write_whole
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -115,14 +115,7 @@ def load_or_make_key(folder: Path) -> LogKey:
             serialization.PrivateFormat.PKCS8,
             serialization.NoEncryption(),
         )
-        new = folder / f"{NAME}.new"
-        new.unlink(missing_ok=True)
-        fd = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        with open(fd, "wb") as file:
-            file.write(pem)
-            file.flush()
-            os.fsync(fd)
-        new.rename(folder / NAME)
+        write_whole(folder / NAME, pem)
     return LogKey(key)
 
 

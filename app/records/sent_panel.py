@@ -27,6 +27,7 @@ from app.records.entry import Origin, reason_as_json
 from app.records.starts import list_digest, sha256
 from app.system.errors import KioskError, os_error_text
 from app.system.texts import Text, TextLike, say, text_in
+from app.system.whole_file import sync_folder, write_whole
 
 if TYPE_CHECKING:
     from app.panel import Panel
@@ -159,7 +160,7 @@ class SentPanels:
         digest = files_hash(contents)
         staged = folder.parent
         listed = staged / f"{digest}.json"
-        _write(listed, json.dumps(sorted(contents)).encode())
+        write_whole(listed, json.dumps(sorted(contents)).encode())
         with suppress(OSError):  # it is there already
             folder.rename(staged / digest)
         self.drop_staged(folder)
@@ -280,9 +281,9 @@ class SentPanels:
         for name, data in contents.items():
             path = draft / name
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            _write(path, data)
+            write_whole(path, data)
         draft.rename(folder / f"{number:04}")
-        _sync(folder)
+        sync_folder(folder)
         for old in numbers[: 1 - BACKUPS]:
             shutil.rmtree(folder / f"{old:04}", ignore_errors=True)
         return number
@@ -309,49 +310,25 @@ class SentPanels:
             path, draft = self._place(self.panel.parent, name), folder / str(number)
             path.parent.mkdir(parents=True, exist_ok=True)
             drafts.append((draft, path))
-            _write(draft, contents[name], like=path)
+            write_whole(draft, contents[name], mode=0o644, like=_like(path))
         for draft, path in drafts:
             draft.replace(path)
         for name in removed:
             if name != SENT_NAME:
                 self._place(self.panel.parent, name).unlink(missing_ok=True)
         for changed in {path.parent for _, path in drafts}:
-            _sync(changed)
+            sync_folder(changed)
         shutil.rmtree(folder, ignore_errors=True)
 
     def _write_state(self, take: Take) -> None:
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        draft = self.folder / f".state.{secrets.token_hex(4)}"
-        try:
-            _write(draft, json.dumps(asdict(take)).encode())
-            draft.replace(self._state)
-        finally:
-            draft.unlink(missing_ok=True)
-        _sync(self.folder)
+        write_whole(self._state, json.dumps(asdict(take)).encode())
 
 
-def _write(path: Path, data: bytes, like: Path | None = None) -> None:
-    """A new file on the disk, with the mode and, where that is permitted, the owner of another."""
-    with open(path, "wb") as file:
-        if like is not None:
-            mode = 0o644
-            with suppress(FileNotFoundError):
-                about = like.stat()
-                mode = about.st_mode & 0o777
-                with suppress(OSError):
-                    os.fchown(file.fileno(), about.st_uid, about.st_gid)
-            os.fchmod(file.fileno(), mode)
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _sync(folder: Path) -> None:
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)
+def _like(path: Path) -> os.stat_result | None:
+    with suppress(FileNotFoundError):
+        return path.stat()
+    return None
 
 
 def _now() -> str:

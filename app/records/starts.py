@@ -20,6 +20,7 @@ from app.system.texts import say
 from app.system.texts.catalogue import files as catalogues
 from app.system.toml_values import key_text, value_text
 from app.system.version import installed_version
+from app.system.whole_file import SUFFIX, write_whole
 
 if TYPE_CHECKING:
     from app.panel import Panel
@@ -32,7 +33,6 @@ FOLDER: Final = "kept-files"
 RESTORED: Final = "restored.json"  # of the data folder: by which backup it was restored, and when
 MOST_FILES: Final = 5000
 MOST_BYTES: Final = 256_000_000
-TEMPORARY: Final = ".new"
 HASH: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -94,15 +94,7 @@ class KeptFiles:
             if path.stat().st_size == len(data):
                 os.utime(path)
                 return
-        new = self.folder / (digest + TEMPORARY)
-        with suppress(FileNotFoundError):
-            new.unlink()
-        fd = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        with open(fd, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fdatasync(fd)
-        new.replace(path)
+        write_whole(path, data)
 
     def _prune(self, needed: Collection[str], needed_bytes: int) -> None:
         """Removes files until those that are needed fit, the longest unused first."""
@@ -118,7 +110,7 @@ class KeptFiles:
     def _files(self, without: Collection[str]) -> Iterator[tuple[float, int, Path]]:
         """Time, size and path of each file; what a server that was killed left behind is removed."""
         for path in self.folder.iterdir():
-            if path.name.endswith(TEMPORARY):
+            if path.name.endswith(SUFFIX):
                 path.unlink(missing_ok=True)
             elif path.name not in without and path.is_file():
                 about = path.stat()

@@ -12,6 +12,7 @@ from app.records.database import BUSY_TIMEOUT_S, NAME, Files, Head, as_log_error
 from app.records.entry import FIELDS, Entry, new_entry
 from app.system.errors import LogError
 from app.system.texts import TextLike, number, say
+from app.system.whole_file import sync_folder
 
 # Writes the file of the operator's log: append, sync, retention. Blocks; used by one thread.
 #
@@ -41,7 +42,7 @@ class Store:
                 self._read_head()
                 self._db.execute("INSERT OR REPLACE INTO about VALUES ('opened', ?)", (boot,))
                 self._wal = os.open(folder / f"{NAME}-wal", os.O_RDONLY | os.O_CLOEXEC)
-                _sync_folder(folder)
+                sync_folder(folder)
                 self._files = Files(folder)
         except BaseException:
             self.close()
@@ -243,14 +244,6 @@ class Store:
             self._db.close()
         except sqlite3.Error as error:
             raise LogError(str(error)) from error
-
-
-def _sync_folder(folder: Path) -> None:
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)
 
 
 # Entries waiting to be written to the operator's log, and the log's limits.

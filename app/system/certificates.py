@@ -20,6 +20,7 @@ from cryptography.hazmat.primitives.asymmetric.types import PrivateKeyTypes, Pub
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from app.system.errors import KioskError
+from app.system.whole_file import write_whole
 
 # Makes keys, certificates and requests for them (X.509, ECDSA P-256). No I/O.
 
@@ -385,12 +386,8 @@ def write_new(file: Path, content: bytes, mode: int) -> None:
 
 def replace_file(file: Path, content: bytes) -> None:
     """Puts a public file in the place of an older one, whole or not at all."""
-    draft = file.with_name(f".{file.name}.new")
     with _writing(file):
-        draft.unlink(missing_ok=True)
-    write_new(draft, content, PUBLIC)
-    with _writing(file):
-        draft.replace(file)
+        write_whole(file, content, mode=PUBLIC)
 
 
 @contextmanager

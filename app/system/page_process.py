@@ -17,7 +17,7 @@ from jinja2 import StrictUndefined, Template, TemplateError, pass_context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
-from app.system.icons import icon, icons
+from app.system.pictures import icon, icons
 
 SECONDS: Final = 1.0
 LAST_SECONDS: Final = 1.5

@@ -1,6 +1,6 @@
 """The names in docs/reference/icons.md, those of the icons that are shipped."""
 
-from app.system.icons import icons
+from app.system.pictures import icons
 
 
 def icon_list() -> str:

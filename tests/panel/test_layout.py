@@ -11,7 +11,7 @@ from app.panel import Panel, Publish, load_panel
 from app.panel.widgets.displays import Indicator
 from app.panel.widgets.key_parts import COLOURS, ICONS, OWN_COLOURS
 from app.system.errors import PanelError
-from app.system.icons import icons
+from app.system.pictures import icons
 from tests.panel.test_panel import toml
 from tests.support.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, Table
 

@@ -22,6 +22,7 @@ from app.records.sent_panel import (
     files_hash,
 )
 from app.system.texts import Text, text_in
+from app.system.whole_file import write_whole
 
 PANEL: Final = """\
 title = "Cell"
@@ -300,7 +301,7 @@ def _take_and_die(
     try:
         for name in ("replace", "rename", "unlink"):
             setattr(Path, name, dying(getattr(Path, name)))
-        sent_panel._write = dying(sent_panel._write)
+        vars(sent_panel)["write_whole"] = dying(write_whole)
         sent.take(new, old, files_hash(old), WHO)
         os._exit(0)
     finally:

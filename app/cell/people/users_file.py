@@ -5,9 +5,8 @@ import hashlib
 import json
 import logging
 import os
-import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -15,6 +14,7 @@ from typing import Any, Final, NamedTuple
 from app.cell.people.users import Edit, UserBook, UsersError, book_of
 from app.system.errors import os_error_text
 from app.system.texts import TextLike
+from app.system.whole_file import give_to_owner_of, write_whole
 
 # What is kept beside the users' file: whether the panel has users, which of their changes the
 # operator's log has, and when users and tokens were last used. A users' file that is missing though the
@@ -65,7 +65,6 @@ def read_state(folder: Path) -> UsersState:
 def write_state(folder: Path, state: UsersState) -> None:
     """Replaces the file; logs why it can't. Blocks."""
     path = folder / STATE
-    draft = folder / f".{STATE}.{secrets.token_hex(4)}"
     content = {
         "logged": state.logged,
         "book": state.book,
@@ -74,13 +73,9 @@ def write_state(folder: Path, state: UsersState) -> None:
         "signed_in": state.last.users,
     }
     try:
-        draft.touch(mode=0o600)
-        draft.write_text(json.dumps(content), encoding="utf-8")
-        draft.replace(path)
+        write_whole(path, json.dumps(content).encode(), durable=False)
     except OSError as error:
         log.warning("%s can not be written: %s", path, error)
-        with suppress(OSError):
-            draft.unlink()
 
 
 def _texts(texts: dict[Any, Any]) -> dict[str, str]:
@@ -182,34 +177,11 @@ class UsersFile:
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
         fd = os.open(self.folder / LOCK, flags, 0o600)
         try:
-            self._give_to_owner(fd)
+            give_to_owner_of(self.folder, fd)
             fcntl.flock(fd, fcntl.LOCK_EX)
             yield
         finally:
             os.close(fd)
 
     def _write(self, text: str) -> None:
-        draft = self.folder / f".{NAME}.{secrets.token_hex(4)}"
-        fd = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        try:
-            with os.fdopen(fd, "w", encoding="utf-8") as file:
-                self._give_to_owner(fd)
-                file.write(text)
-                file.flush()
-                os.fsync(fd)
-            draft.replace(self.path)
-        except BaseException:
-            draft.unlink(missing_ok=True)
-            raise
-        folder = os.open(self.folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-
-    def _give_to_owner(self, fd: int) -> None:
-        """A file that root makes belongs to the folder's owner, so that the server can read it."""
-        if os.geteuid() == 0:
-            owner = self.folder.stat()
-            with suppress(OSError):
-                os.fchown(fd, owner.st_uid, owner.st_gid)
+        write_whole(self.path, text.encode(), of_folder=True)

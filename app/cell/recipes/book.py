@@ -9,7 +9,7 @@ import os
 import stat
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -39,6 +39,7 @@ from app.system.clock import format_time
 from app.system.errors import OS_ERRORS, InputError
 from app.system.printable import printable
 from app.system.texts import Text, TextLike, say
+from app.system.whole_file import give_to_owner_of, sync_folder, write_whole
 
 # The folder of a set of recipes: a TOML file each, written whole or not at all.
 #
@@ -51,7 +52,6 @@ LOCK: Final = "recipes.lock"  # in it
 DELETED: Final = "deleted"  # where a deleted recipe's file goes
 MOST_DELETED: Final = 50
 SUFFIX: Final = ".toml"
-PART: Final = ".part"  # of a file that is being written
 NO_LINK: Final = os.O_NOFOLLOW | os.O_CLOEXEC  # flags of every open
 MOST_FILES: Final = 1000  # that are read
 
@@ -79,7 +79,7 @@ class RecipeFolder:
         except OSError as error:
             raise disk_error(error) from error
         try:
-            _give_to_owner(fd, self.path.parent)
+            give_to_owner_of(self.path.parent, fd)
             fcntl.flock(fd, fcntl.LOCK_EX)
             yield
         finally:
@@ -128,7 +128,7 @@ class RecipeFolder:
             deleted = self.path / DELETED
             deleted.mkdir(mode=0o700, exist_ok=True)
             os.replace(self._file(recipe_id), deleted / f"{recipe_id}.{time.time_ns()}{SUFFIX}")
-            _sync(self.path)
+            sync_folder(self.path)
             for old in sorted(deleted.iterdir(), key=lambda file: file.stat().st_mtime)[:-MOST_DELETED]:
                 old.unlink()
         except FileNotFoundError:
@@ -163,20 +163,7 @@ def read_file(file: Path, most: int) -> bytes | Text:
 
 def write_file(file: Path, content: bytes) -> None:
     """Writes a file whole or not at all, and syncs it; OSError if it is not there then."""
-    part = file.with_suffix(PART)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NONBLOCK | NO_LINK
-    try:
-        with open(os.open(part, flags, 0o600), "wb") as written:
-            _give_to_owner(written.fileno(), file.parent)
-            written.write(content)
-            written.flush()
-            os.fsync(written.fileno())
-        os.replace(part, file)
-    except OSError:
-        with suppress(OSError):
-            part.unlink()
-        raise
-    _sync(file.parent)
+    write_whole(file, content, of_folder=True)
 
 
 def _make(folder: Path) -> None:
@@ -186,25 +173,8 @@ def _make(folder: Path) -> None:
     if not folder.parent.is_dir():
         _make(folder.parent)
     folder.mkdir(mode=0o700, exist_ok=True)
-    _give_to_owner(folder, folder.parent)
-    _sync(folder.parent)
-
-
-def _give_to_owner(file: int | Path, folder: Path) -> None:
-    """What root makes belongs to the owner of the folder that it is in, so that the server can use
-    it."""
-    if os.geteuid() == 0:
-        owner = folder.stat()
-        with suppress(OSError):
-            os.chown(file, owner.st_uid, owner.st_gid)
-
-
-def _sync(folder: Path) -> None:
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)
+    give_to_owner_of(folder.parent, folder)
+    sync_folder(folder.parent)
 
 
 def disk_error(error: OSError) -> RecipeDiskError:

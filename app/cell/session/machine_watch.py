@@ -36,6 +36,7 @@ from app.system.texts import Text, TextLike, joined, say
 from app.system.time_source import TimeSource, read_time_source
 from app.system.version import installed_version
 from app.system.vex import read_signed_vex, verdicts
+from app.system.whole_file import write_whole
 
 log = logging.getLogger("kiosk.machine")
 
@@ -94,10 +95,7 @@ class MachineReader:
 
     def postpone(self, postponed: Postponed) -> None:
         """OSError."""
-        file = self._data / POSTPONED
-        draft = file.with_suffix(".new")
-        draft.write_text(json.dumps(asdict(postponed)), encoding="utf-8")
-        draft.replace(file)
+        write_whole(self._data / POSTPONED, json.dumps(asdict(postponed)).encode())
 
     def _room(self) -> LogRoom | None:
         if not self._rules.enabled:

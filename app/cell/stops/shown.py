@@ -5,7 +5,6 @@ A file is written whole or not at all, has a number of bytes at most, and makes 
 """
 
 import json
-import os
 import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,6 +20,7 @@ from app.cell.view.view import View
 from app.system.errors import LogError
 from app.system.texts import Text
 from app.system.texts.text import text_from
+from app.system.whole_file import SUFFIX, write_whole
 
 FOLDER: Final = "stop-views"  # of the data folder
 MOST_FILES: Final = 100
@@ -28,7 +28,6 @@ MOST_BYTES: Final = 2_000_000  # of a view as JSON; a file is packed
 LEAST_LEFT_OUT: Final = 2_000  # bytes of a part that is left out
 FORMAT: Final = 1
 NAME: Final = re.compile(r"(?P<ms>[0-9]{13})(?:-(?P<robot>[A-Za-z0-9_-]{1,64}))?\.json\.gz")
-TEMPORARY: Final = ".new"
 TEXT: Final = "=text"  # the only key of a Text
 ROWS: Final = "rows"  # of alarms, the name of their part
 PACKED: Final = 31  # gzip, for zlib
@@ -174,15 +173,9 @@ def write(data: Path, shown: ShownView) -> None:
     name = f"{round(shown.at * 1000):013d}{f'-{shown.robot}' if shown.robot else ''}.json.gz"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        for left in folder.glob(f"*{TEMPORARY}"):  # of a server that was killed
+        for left in folder.glob(f"*{SUFFIX}"):  # of a server that was killed
             left.unlink(missing_ok=True)
-        new = folder / f"{name}{TEMPORARY}"
-        fd = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        with open(fd, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fdatasync(fd)
-        new.replace(folder / name)
+        write_whole(folder / name, content)
         for old in sorted(file.name for file in folder.iterdir() if NAME.fullmatch(file.name))[
             :-MOST_FILES
         ]:

@@ -5,7 +5,6 @@
 `log export`: 1 if the file can't be written, 0 and 2 as above.
 """
 
-import os
 import sys
 import time
 from argparse import ArgumentTypeError, Namespace
@@ -19,6 +18,7 @@ from app.records.database import Filter, as_log_error, entry_count, open_read_on
 from app.records.verify import Signed, verify
 from app.system.errors import KioskError, LogError
 from app.system.texts.catalogue import ENGLISH, files
+from app.system.whole_file import whole_file
 from app.tools.cli.arguments import add_data_folder, data_folder, point_in_time
 from app.tools.cli.output import terminal_progress
 from app.tools.cli.parser import Parser
@@ -159,7 +159,6 @@ def _export(options: Namespace) -> int:
             total = entry_count(db)
     finally:
         db.close()
-    draft = file.with_name(f".{file.name}.{os.getpid()}")
     with terminal_progress("entries exported") as progress:
 
         def counted() -> Iterator[bytes]:
@@ -169,14 +168,11 @@ def _export(options: Namespace) -> int:
                 progress(min(number * ROWS_AT_ONCE, total), total)
 
         try:
-            with open(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as target:
+            with whole_file(file) as target:
                 target.writelines(gzipped(counted()) if file.suffix == ".gz" else counted())
-            draft.replace(file)
         except OSError as error:
             print(f"{file} can't be written: {error.strerror}", file=sys.stderr)
             return 1
-        finally:
-            draft.unlink(missing_ok=True)
     print(f"{total} entries written to {file}", file=sys.stderr)
     return 0
 

@@ -3,11 +3,13 @@ is given."""
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from app.system.errors import KioskError
+from app.system.whole_file import whole_file
 from app.tools.cli.parser import Parser
 
 NAME: Final = "give another name with -o"
@@ -44,17 +46,9 @@ def draft_of(file: Path, force: bool) -> Iterator[Path]:
     """A file beside `file` that takes its place after the block: `file` is written whole or not at all.
     OutputError if it can't be."""
     target = file.resolve()  # a link stays one
-    draft = target.with_name(f".{target.name}.new")
-    try:
-        with writing(file):
-            draft.unlink(missing_ok=True)
-            draft.touch(exist_ok=False)  # not a link that somebody has put there
-            yield draft
-            check_absent(file, force)
-            draft.replace(target)
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
+    check = partial(check_absent, file, force)
+    with writing(file), whole_file(target, mode=None, durable=False, check=check) as draft:
+        yield Path(draft.name)
 
 
 @contextmanager

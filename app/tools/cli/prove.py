@@ -96,6 +96,7 @@ def _watched(options: Namespace, subject: "Subject") -> "Proof":
 
 def _report(options: Namespace, subject: "Subject", proof: "Proof") -> None:
     from app.records.log_key import load_or_make_key
+    from app.tools.cli.output import draft_of
     from app.tools.prove.report import as_html, as_json, as_text, signed
 
     key = None
@@ -107,7 +108,8 @@ def _report(options: Namespace, subject: "Subject", proof: "Proof") -> None:
         key = load_or_make_key(folder)
     report = signed(as_json(subject, proof), key)
     if options.report is not None:
-        options.report.write_text(as_html(report), encoding="utf-8")
+        with draft_of(options.report, force=True) as draft:
+            draft.write_text(as_html(report), encoding="utf-8")
     if options.json:
         print(json.dumps(report, indent=2, ensure_ascii=False))
     else:

@@ -18,7 +18,7 @@ from app.panel.widgets.key_parts import COLOURS
 from app.panel.widgets.kinds import KINDS
 from app.ros.messages import Interfaces
 from app.system.errors import InterfaceError, Remark
-from app.system.icons import icons
+from app.system.pictures import icons
 from app.system.texts import ENGLISH, TextLike, say
 from app.system.texts.catalogue import files
 from app.system.texts.locales import own_name

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 from app.panel.file.toml_lines import Path
-from app.system.icons import icons
+from app.system.pictures import icons
 from app.system.texts import TextLike, say
 from app.system.texts.catalogue import files
 from app.tools.editor.paths import Tables, title_of

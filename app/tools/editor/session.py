@@ -6,8 +6,6 @@ import hashlib
 import json
 import os
 import re
-import secrets
-import stat
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -20,6 +18,7 @@ from app.panel.file.keys import place_of
 from app.panel.file.toml_lines import Path
 from app.system.errors import InputError, os_error_text
 from app.system.texts import TextLike, say
+from app.system.whole_file import sync_folder, write_whole
 from app.tools.editor.document import (
     BOM,
     Change,
@@ -408,7 +407,7 @@ class EditSession:
         before = self.backups()
         number = _number(before[0]) + 1 if before else 1
         file = folder / f"{number:04d}{f'-{name}' if name else ''}.toml"
-        _write_new(file, data)
+        write_whole(file, data, replaces=False)
         size = len(data)
         for count, old in enumerate(before, 1):
             size += old.stat().st_size
@@ -435,9 +434,7 @@ class _Journal:
         data = json.dumps(content, ensure_ascii=False)
         file = self._folder / SLOTS[self._number % 2]
         try:
-            draft = file.with_suffix(".part")
-            draft.write_text(f"{_digest(data)}\n{data}", encoding="utf-8", newline="")
-            os.replace(draft, file)
+            write_whole(file, f"{_digest(data)}\n{data}".encode(), durable=False)
         except OSError as error:
             self.problem = os_error_text(error)
             return
@@ -464,7 +461,7 @@ class _Journal:
         content = {"number": 0, "saved_s": kept.saved_s, "text": kept.text, "base": kept.base}
         data = json.dumps(content, ensure_ascii=False)
         with suppress(OSError):
-            _write_new(self._folder / RECOVERED, f"{_digest(data)}\n{data}".encode(), overwrite=True)
+            write_whole(self._folder / RECOVERED, f"{_digest(data)}\n{data}".encode())
 
     def aside(self) -> Recovered | None:
         read = self._read(self._folder / RECOVERED)
@@ -491,7 +488,7 @@ class _Journal:
                     return
             with suppress(OSError):  # it is saved already, or the next change says why
                 _sync_path(file)
-                _sync_path(self._folder)
+                sync_folder(self._folder)
 
     @staticmethod
     def _read(file: FilePath) -> tuple[int, Recovered] | None:
@@ -532,48 +529,17 @@ def _sync_path(path: FilePath) -> None:
         os.close(fd)
 
 
-def _write_new(file: FilePath, data: bytes, *, overwrite: bool = False) -> None:
-    """Writes and syncs a file of the editor's own, whole or not at all."""
-    draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
-    try:
-        with open(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as written:
-            written.write(data)
-            written.flush()
-            os.fsync(written.fileno())
-        if overwrite:
-            os.replace(draft, file)
-        else:
-            os.link(draft, file)
-    finally:
-        draft.unlink(missing_ok=True)
-    _sync_path(file.parent)
-
-
 def _write_whole(path: FilePath, data: bytes, before: bytes | None) -> None:
     """Replaces a file, with the same mode and owner; a link leads to the new file too. OSError if it
     is not there then, also if someone else has written it since it was read."""
     target = path.resolve()
-    about = target.stat() if before is not None else None
-    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    mode = stat.S_IMODE(about.st_mode) if about else 0o644
-    try:
-        with open(
-            os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600), "wb"
-        ) as written:
-            written.write(data)
-            written.flush()
-            if about and (about.st_uid, about.st_gid) != (os.geteuid(), os.getegid()):
-                with suppress(PermissionError):
-                    os.fchown(written.fileno(), about.st_uid, about.st_gid)
-            os.fchmod(written.fileno(), mode)
-            os.fsync(written.fileno())
+
+    def check() -> None:
         if before is not None and target.read_bytes() != before:
             raise _ChangedAgain
-        os.replace(draft, target)
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
-    _sync_path(target.parent)
+
+    like = target.stat() if before is not None else None
+    write_whole(target, data, mode=0o644, like=like, check=check)
 
 
 # The place of an edit of an older revision in the tables of now. LookupError if it has changed.

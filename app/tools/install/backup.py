@@ -34,6 +34,7 @@ from app.records.verify import verify
 from app.system.clock import iso_time
 from app.system.errors import KioskError, LogError
 from app.system.version import installed_version
+from app.system.whole_file import sync_folder
 from app.tools.install.panel_files import copies_for, users_file
 
 FORMAT: Final = 1  # of the zip
@@ -375,9 +376,9 @@ def _own(stage: Path, owner: os.stat_result) -> None:
 
 def _exchange(stage: Path, data: Path) -> None:
     """Exchanges the two folders in one step: at each moment there is the old one or the new one."""
-    _sync(stage)
+    sync_folder(stage)
     exchange_folders(stage, data)
-    _sync(data.parent)
+    sync_folder(data.parent)
 
 
 def _set_aside(old: Path, data: Path, stamp: str) -> Path:
@@ -405,11 +406,3 @@ def exchange_folders(left: Path, right: Path) -> None:
         if code in (errno.EINVAL, errno.ENOSYS, errno.EXDEV, errno.EBUSY):
             why = f"{why}. The data folder has to be on a local disk, and not be a mount itself"
         raise BackupError(f"{right} can't be exchanged: {why}. Nothing was changed")
-
-
-def _sync(folder: Path) -> None:
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

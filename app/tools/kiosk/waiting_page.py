@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.system.texts.catalogue import ENGLISH, files, translations
+from app.system.whole_file import write_whole
 from app.tools.kiosk.config import TAG
 
 STYLE: Final = """
@@ -86,9 +87,7 @@ def _title(title: Any, language: str) -> str:
 
 def write_page(panel: Path, target: Path) -> None:
     """Writes the whole page at once: the browser may be reading the one before."""
-    draft = target.with_suffix(".draft")
-    draft.write_text(page_of(panel), encoding="utf-8")
-    draft.replace(target)
+    write_whole(target, page_of(panel).encode(), mode=None, durable=False)
 
 
 def main(arguments: Sequence[str]) -> int:

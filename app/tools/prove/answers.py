@@ -3,7 +3,6 @@ that the proof can be interrupted at any moment and continued later."""
 
 import fcntl
 import json
-import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, Literal, TextIO
@@ -12,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from app.system.errors import KioskError, os_error_text
 from app.system.texts import render
+from app.system.whole_file import write_whole
 
 HASH_SHOWN: Final = 12
 Word = Literal["tick", "cross", "skip"]
@@ -83,13 +83,9 @@ class AnswersFile:
             ) from error
 
     def _write(self) -> None:
-        draft = self._path.with_name(f".{self._path.name}.new")
+        text = json.dumps(self._answers.model_dump(), indent=1, ensure_ascii=False)
         try:
-            with draft.open("w", encoding="utf-8") as file:
-                json.dump(self._answers.model_dump(), file, indent=1, ensure_ascii=False)
-                file.flush()
-                os.fsync(file.fileno())
-            draft.replace(self._path)
+            write_whole(self._path, text.encode(), mode=None)
         except OSError as error:
             raise self._fault("written", error) from error
 

@@ -17,7 +17,7 @@ from app.panel.layout import Page
 from app.panel.numbers import decimal_text
 from app.panel.rules import CLEANING_S
 from app.panel.widgets.families import BaseWidget
-from app.system.icons import icon
+from app.system.pictures import icon
 from app.system.printable import printable
 from app.system.texts import Text, render, say
 from app.system.texts.locales import clear_text, list_separator, number_in, symbols

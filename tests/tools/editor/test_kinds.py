@@ -7,7 +7,7 @@ import pytest
 
 from app.panel.reference.schema import WORDS
 from app.panel.widgets.kinds import KINDS
-from app.system.icons import icons
+from app.system.pictures import icons
 from app.system.texts import render
 from app.tools.editor.kinds import FAMILIES, FAMILY_NAMES, NO_WIDGETS, PLACELESS, added, place_near
 
