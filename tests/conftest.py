@@ -203,6 +203,20 @@ def patient_log() -> None:
         wait_for_the_disk()
 
 
+@pytest.fixture(autouse=True)
+def callbacks_that_succeed() -> Iterator[None]:
+    """An error of a test in whose process a callback of Zenoh's has failed: else only a time that is
+    over would tell. Servers of tests look for it when they end."""
+    if "app.ros.zenoh.answers" not in sys.modules:
+        yield
+        return
+    from app.ros.zenoh.answers import callback_errors
+
+    before = callback_errors.count
+    yield
+    assert callback_errors.count == before, "a callback on a thread of Zenoh's failed: see the log"
+
+
 @pytest.fixture(scope="session")
 def domain() -> int:
     return domains.first()

@@ -24,6 +24,7 @@ from app.cell.session.fleet import Fleet
 from app.cell.stops.oee import NOT_ANSWERED, SHORT, ShiftFigures
 from app.cell.view.machine_status import Machine
 from app.panel.rules import OeeRules
+from app.ros.zenoh.answers import callback_errors
 from app.system.texts import render
 from app.web.metrics import Metrics
 
@@ -56,6 +57,8 @@ class _Of(Collector):
         yield CounterMetricFamily("kiosk_refusals_left_out", about, value=metrics.left_out())
         about = "Presses, holds and cancels over their limit, answered 429"
         yield CounterMetricFamily("kiosk_presses_limited", about, value=metrics.limited())
+        about = "Callbacks of Zenoh's that failed: each has lost a message or an answer"
+        yield CounterMetricFamily("kiosk_zenoh_callback_errors", about, value=callback_errors.count)
         about = "Entries of the operator's log that a copy of it lacks"
         uncopied = GaugeMetricFamily("kiosk_log_uncopied", about, labels=["copy"])
         for place, entries in metrics.uncopied().items():

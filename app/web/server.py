@@ -443,7 +443,7 @@ def check_port(server: Config | None) -> None:
 # the client's, and the number of those that follow.
 
 # asyncio logs what fails below a connection, such as a TLS handshake.
-LOGGERS: Final = ("uvicorn.error", "asyncio", "kiosk.connections", "kiosk.web")
+LOGGERS: Final = ("uvicorn.error", "asyncio", "kiosk.connections", "kiosk.web", "kiosk.zenoh")
 TOKEN_PATH: Final = re.compile(r"(/recordings/shared/)[^/?\s]+")
 COUNT_EVERY_S: Final = 5.0
 # uvicorn's and websockets' words → ours, for faults of a client.

@@ -55,6 +55,7 @@ CYCLONE_ON_LOOPBACK = (
 MOST_MEMORY = 2 << 30  # bytes of a node
 
 STOOD = "Timeout (0:00:20)!"  # written by a server that hung at shutdown
+CALLBACK_FAILED = "a callback on a thread of Zenoh failed"  # what it receives may be lost
 
 
 # Even on a busy machine, an immediate effect happens within this time.
@@ -162,6 +163,7 @@ class Process:
             if pipe is not None:
                 pipe.close()
         assert STOOD not in self.text, self.text
+        assert CALLBACK_FAILED not in self.text, self.text
         return status
 
 

@@ -230,6 +230,7 @@ def test_no_other_code_writes_beside_a_file_and_replaces_it() -> None:
         "app/tools/prove/answers.py": "old answers are set aside",
         "app/tools/install/file_tree.py": "each folder of the path is opened without following links",
     }
-    places = re.compile(r"os\.replace\(|\.replace\((path|file|target|draft|self\._?path|self\.aside)\)")
+    targets = r"(path|file|target|draft|self\._?path|self\.aside)"
+    places = re.compile(rf"\bos\.replace\(|\.replace\({targets}\)")
     files = {path for path in (ROOT / "app").rglob("*.py") if places.search(path.read_text())}
     assert {path.relative_to(ROOT).as_posix() for path in files} == reasons.keys()

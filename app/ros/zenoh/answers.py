@@ -1,17 +1,64 @@
-"""Answers to Zenoh queries on the event loop, and the protocols of a link by which the admin space and
-the ROS graph are queried."""
+"""Callbacks on Zenoh's threads, answers to Zenoh queries on the event loop, and the protocols of a link
+by which the admin space and the ROS graph are queried."""
 
 import asyncio
+import ctypes
 import json
+import logging
+import threading
 import time
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any, Final, Protocol, TypeVar
 
 import zenoh
 from zenoh.handlers import Callback
 
 from app.ros.dialects.dialect import newest
+
+# Callbacks on Zenoh's threads, which Python did not start. `attach` keeps their thread state: without
+# it, Python creates one at each callback and deletes it afterwards.
+
+log = logging.getLogger("kiosk.zenoh")
+
+Event = TypeVar("Event")
+FAILED: Final = "a callback on a thread of Zenoh failed: its message or answer is lost"
+_attached: Final = threading.local()  # not their ids: one that has ended leaves its id to another
+
+
+class CallbackErrors:
+    """How many callbacks have failed since the start of the process."""
+
+    count = 0
+
+
+callback_errors: Final = CallbackErrors()
+
+
+def attach() -> None:
+    """Call it in every callback on such a thread. Only the first call in a thread has an effect."""
+    if not hasattr(_attached, "is_done"):
+        _attached.is_done, me = True, threading.get_ident()
+        if all(thread.ident != me for thread in threading.enumerate()):  # those have theirs
+            ctypes.pythonapi.PyGILState_Ensure()
+
+
+def direct(
+    function: Callable[[Event], None], on_end: Callable[[], None] | None = None
+) -> "Callback[Event]":
+    """A handler that runs on Zenoh's receiving thread. What `function` raises is counted and logged,
+    and the next event arrives. Every callback of the package is one of these."""
+
+    def handle(event: Event) -> None:
+        attach()
+        try:
+            function(event)
+        except Exception:
+            callback_errors.count += 1
+            log.exception(FAILED)
+
+    return Callback(handle, on_end, indirect=False)
+
 
 # Receives the answers to a Zenoh query on the event loop, and payloads that are kept.
 
@@ -40,7 +87,7 @@ async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]]
         with suppress(RuntimeError):  # the loop is closed
             loop.call_soon_threadsafe(finish)
 
-    ask(Callback(on_reply, on_end, indirect=False))
+    ask(direct(on_reply, on_end))
     late = loop.call_later(timeout_s + 1, finish)
     try:
         await done
@@ -66,7 +113,7 @@ def first_answer(ask: Ask, read: Read) -> "asyncio.Future[bytes | None]":
         if reply.ok is not None:
             hand_over(bytes(read(reply.ok)))
 
-    ask(Callback(on_reply, lambda: hand_over(None), indirect=False))
+    ask(direct(on_reply, lambda: hand_over(None)))
     return answered
 
 

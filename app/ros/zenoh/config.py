@@ -12,8 +12,8 @@ from threading import Event
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 import zenoh
-from zenoh.handlers import Callback
 
+from app.ros.zenoh.answers import direct
 from app.system.errors import LinkError, SettingsError
 from app.system.public import PUBLIC_ENDPOINT, Public
 
@@ -262,7 +262,7 @@ def tokens_for_clients(config: zenoh.Config, expressions: Collection[str]) -> li
     try:
         with zenoh.open(client_config(config)) as session:
             declare = session.liveliness().declare_subscriber
-            held = [declare(each, Callback(see, indirect=False), history=True) for each in expressions]
+            held = [declare(each, direct(see), history=True) for each in expressions]
             Event().wait(HISTORY_S)  # which a clock that is set does not disturb
             del held
     except zenoh.ZError:

@@ -2,10 +2,8 @@
 
 import asyncio
 import atexit
-import ctypes
 import logging
 import os
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -17,7 +15,7 @@ from zenoh.ext import CacheConfig, MissDetectionConfig, declare_advanced_publish
 from zenoh.handlers import Callback
 
 from app.ros.dialects.dialect import Dialect, caches, is_cache_of, numbered_publisher
-from app.ros.zenoh.answers import ask_newest, collected, first_answer, own_payload
+from app.ros.zenoh.answers import ask_newest, collected, direct, first_answer, own_payload
 from app.ros.zenoh.config import (
     endpoints_of,
     in_own_thread,
@@ -107,7 +105,7 @@ class TokenQuery:
         routers = len(self._session.info.routers_zid()) + len(self._session.info.peers_zid())
         if routers > 1 and self._watched is None:
             self._watched = self._session.liveliness().declare_subscriber(
-                self._expression, Callback(_ignore, indirect=False), history=True
+                self._expression, direct(_ignore), history=True
             )
         tokens = await self._query(timeout_s)
         end = asyncio.get_running_loop().time() + HISTORY_WITHIN_S
@@ -137,22 +135,10 @@ def _ignore(_: zenoh.Sample) -> None:
     """For samples that are not needed."""
 
 
-# Keeps the Python thread state of Zenoh's threads, which Python did not start. Without `attach`, Python
-# creates one at each callback and deletes it afterwards.
-
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
 # waits for the network wakes another one for each message; one thread for both costs half.
 RUNTIME: Final = "(rx: (handover: net))"
 os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
-_attached: Final = threading.local()  # not their ids: one that has ended leaves its id to another
-
-
-def attach() -> None:
-    """Call it in every callback on such a thread. Only the first call in a thread has an effect."""
-    if not hasattr(_attached, "is_done"):
-        _attached.is_done, me = True, threading.get_ident()
-        if all(thread.ident != me for thread in threading.enumerate()):  # those have theirs
-            ctypes.pythonapi.PyGILState_Ensure()
 
 
 # Owns the Zenoh session. Zenoh's threads put what they receive into the inbox. Errors of Zenoh are
@@ -325,13 +311,7 @@ class ZenohSession:
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
         """A handler that runs on Zenoh's receiving thread. It does nothing after `renew`."""
-        take = self._inbox.guarded(function)
-
-        def handle(event: Any) -> None:
-            attach()
-            take(event)
-
-        return Callback(handle, indirect=False)
+        return direct(self._inbox.guarded(function))
 
     def declare_tokens(self, tokens: Iterable[str]) -> None:
         """Holds exactly these liveliness tokens from now on."""

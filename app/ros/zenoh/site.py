@@ -7,16 +7,15 @@ a queryable. A wall publishes nothing.
 
 import asyncio
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import zenoh
-from zenoh.handlers import Callback
 
+from app.ros.zenoh.answers import direct
 from app.ros.zenoh.config import Config, in_own_thread, open_client, translated
-from app.ros.zenoh.session import attach
 from app.system.errors import LinkError
 
 PREFIX: Final = "operator-panel"
@@ -87,14 +86,6 @@ class _Client:
                 await in_own_thread(session.close)
 
 
-def _direct(function: Callable[[Any], None]) -> "Callback[Any]":
-    def handle(event: Any) -> None:
-        attach()
-        function(event)
-
-    return Callback(handle, indirect=False)
-
-
 class SummaryPublisher(_Client):
     """Publishes the summary of one cell. `others` has the newest payload of another panel that
     publishes as the same cell; it is emptied by `take_other`."""
@@ -114,9 +105,9 @@ class SummaryPublisher(_Client):
             allowed_destination=zenoh.Locality.REMOTE,
         )
         return [
-            session.declare_queryable(self._key, _direct(self._answer)),
+            session.declare_queryable(self._key, direct(self._answer)),
             session.declare_subscriber(
-                self._key, _direct(self._hear), allowed_origin=zenoh.Locality.REMOTE
+                self._key, direct(self._hear), allowed_origin=zenoh.Locality.REMOTE
             ),
             session.liveliness().declare_token(self._token),
         ]
@@ -179,9 +170,9 @@ class SummaryReader(_Client):
             declared
             for site in self._sites
             for declared in (
-                session.declare_subscriber(summary_key(site), _direct(self._on_summary)),
+                session.declare_subscriber(summary_key(site), direct(self._on_summary)),
                 session.liveliness().declare_subscriber(
-                    alive_key(site), _direct(self._on_token), history=True
+                    alive_key(site), direct(self._on_token), history=True
                 ),
             )
         ]
@@ -201,7 +192,7 @@ class SummaryReader(_Client):
             with suppress(zenoh.ZError):
                 session.get(
                     selector,
-                    _direct(self._on_reply),
+                    direct(self._on_reply),
                     target=zenoh.QueryTarget.ALL,
                     consolidation=zenoh.ConsolidationMode.NONE,
                     timeout=WHOLE_WITHIN_S,

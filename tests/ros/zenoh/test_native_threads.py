@@ -9,9 +9,9 @@ import pytest
 import zenoh
 from zenoh.handlers import Callback
 
-from app.ros.zenoh import session
+from app.ros.zenoh import answers
+from app.ros.zenoh.answers import attach
 from app.ros.zenoh.config import config_to
-from app.ros.zenoh.session import attach
 from tests.support.parts import ROOT, until
 
 LEAVING = """
@@ -49,8 +49,8 @@ def test_a_thread_of_pythons_own_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
     """It ends with its state, and would leave it behind."""
     calls: list[int] = []
     api = SimpleNamespace(PyGILState_Ensure=lambda: calls.append(threading.get_native_id()))
-    monkeypatch.setattr(session, "ctypes", SimpleNamespace(pythonapi=api))
-    monkeypatch.setattr(session, "_attached", threading.local())
+    monkeypatch.setattr(answers, "ctypes", SimpleNamespace(pythonapi=api))
+    monkeypatch.setattr(answers, "_attached", threading.local())
     thread = threading.Thread(target=attach)
     thread.start()
     thread.join(5)
