@@ -1,11 +1,13 @@
 """Sign-in with a typed name, and the pages of tiles of a panel with many users, on a touched screen."""
 
 from collections.abc import Iterator
+from typing import Final
+from urllib.parse import quote
 
 import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, expect
 
-from tests.support.browser.pages import CUT_TILES
+from tests.support.browser.pages import CUT_TILES, DRAWN
 from tests.support.parts import ROOT, Server
 from tests.support.servers import ready
 from tests.support.users import add_user, says
@@ -16,6 +18,7 @@ SIZES = ((1280, 800), (1024, 600), (800, 480))
 LANGUAGES = ("en", "de", "ja")
 NAMES = [f"{letter}. User" for letter in "ABCDEFGHIJKLM"]
 TYPED = "novak"
+LONG = "Katharina Reichenbach"
 
 
 @pytest.fixture(scope="module")
@@ -23,6 +26,7 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     data = tmp_path_factory.mktemp("data")
     for name in NAMES:
         add_user(data, name, "operator", pin="2580", badge="04A2B3" if name == NAMES[0] else "")
+    add_user(data, LONG, "operator", pin="3690")
     add_user(data, TYPED, "engineer", pin="1470", password="long enough")
     panel = tmp_path_factory.mktemp("panel") / "panel.toml"
     panel.write_text((ROOT / "tests/reference.toml").read_text())
@@ -106,12 +110,38 @@ def test_pages_of_tiles_are_turned_with_large_buttons(screen: tuple[Page, tuple[
         if number < 3:
             more.tap()
     expect(page.locator(".turn .tile").last).to_have_attribute("aria-disabled", "true")
-    assert sorted(seen) == sorted([*NAMES, TYPED])
+    assert sorted(seen) == sorted([*NAMES, LONG, TYPED])
     page.locator(".tiles .tile[href*='user=M']").tap()
     expect(page.locator(".pad")).to_be_visible()
     expect(page.locator(".tile[aria-current] b")).to_have_text("M. User")
     page.locator(".turn .tile").first.tap()
     expect(page.locator(".turn p")).to_contain_text("2")
+
+
+CUT_HEADS: Final = """() => [...document.querySelectorAll(".sign-in .head h2")]
+  .filter((head) => head.scrollWidth > head.clientWidth + 1
+    || getComputedStyle(head).overflow !== "visible"
+    || head.getBoundingClientRect().bottom > head.parentElement.getBoundingClientRect().bottom + 1)
+  .map((head) => head.textContent)"""
+
+
+def test_titles_are_whole_also_beside_sign_out_and_for_a_long_name(
+    screen: tuple[Page, tuple[int, int]],
+) -> None:
+    page, size = screen
+    page.goto(f"/signin?user={TYPED}")
+    expect(page.locator("body[data-touch-entry]")).to_be_attached()
+    for digit in "1470":
+        page.locator(f".pad button[value='{digit}']").tap()
+    page.locator(".sign-in-key").tap()
+    expect(page.locator("a.user")).to_have_attribute("data-user", TYPED)
+    page.goto(f"/signin?user={quote(LONG)}")
+    expect(page.locator(".sign-in .small-key")).to_be_visible()
+    expect(page.locator("#secret")).to_contain_text(LONG)
+    page.evaluate(DRAWN)
+    assert page.evaluate(CUT_HEADS) == []
+    within(page, size, ".small-key", ".pad button", ".sign-in-key", ".tiles .tile", ".turn .tile")
+    assert page.evaluate("document.documentElement.scrollWidth") == size[0]
 
 
 @pytest.fixture

@@ -66,9 +66,12 @@ priority = 3
 "/speed" = { values = [8.0] }
 """
 
-TWO_ROBOTS = PANEL.replace('languages = ["en", "ja"]', 'languages = ["en", "ja", "de"]').replace(
-    "[[page]]",
-    """[[robot]]
+TWO_ROBOTS = (
+    PANEL.replace('languages = ["en", "ja"]', 'languages = ["en", "ja", "de"]')
+    .replace("[state]", '[state]\nstops = ["WAITING"]')
+    .replace(
+        "[[page]]",
+        """[[robot]]
 id = "left"
 name = { en = "Left", ja = "左", de = "Links" }
 namespace = "/left"
@@ -77,7 +80,8 @@ id = "right"
 name = { en = "Right", ja = "右", de = "Rechts" }
 namespace = "/right"
 [[page]]""",
-    1,
+        1,
+    )
 )
 
 
