@@ -6,6 +6,7 @@ A new file beside it takes its place. Below folders that others may write, see
 """
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import BinaryIO, Final, TypedDict, Unpack
 
 SUFFIX: Final = ".new"  # of a file that is being written, or was left by a process that was killed
 PRIVATE: Final = 0o600
+LEFT_AFTER_S: Final = 600.0  # nobody is writing such a file any more
 NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
@@ -65,8 +67,20 @@ def whole_file(path: Path, **options: Unpack[Options]) -> Iterator[BinaryIO]:
         with suppress(OSError):
             draft.unlink(missing_ok=True)
         raise
+    _remove_left(path)
     if options.get("durable", True):
         sync_folder(path.parent)
+
+
+def _remove_left(path: Path) -> None:
+    """Removes what processes that were killed have left of earlier writes of this file."""
+    begin, oldest = f".{path.name}.", time.time() - LEFT_AFTER_S
+    with suppress(OSError):
+        for name in os.listdir(path.parent):
+            if name.startswith(begin) and name.endswith(SUFFIX):
+                left = path.with_name(name)
+                if left.lstat().st_mtime < oldest:
+                    left.unlink()
 
 
 def write_whole(path: Path, content: bytes, **options: Unpack[Options]) -> None:

@@ -135,6 +135,17 @@ def test_a_write_that_succeeds_leaves_the_new_content_alone(tmp_path: Path, repl
     assert [path.name for path in tmp_path.iterdir()] == ["file.json"]
 
 
+def test_what_a_killed_process_has_left_goes_with_a_later_write(tmp_path: Path) -> None:
+    """Not what another process may be writing, and not what is left of other files."""
+    mine, new, other = (tmp_path / name for name in (".file.1.new", ".file.2.new", ".more.1.new"))
+    for left in (mine, new, other):
+        left.write_bytes(OLD)
+    for left in (mine, other):
+        os.utime(left, (0, 0))
+    write_whole(tmp_path / "file", NEW)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".file.2.new", ".more.1.new", "file"]
+
+
 def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
     outside = tmp_path / "outside"
     outside.write_bytes(OLD)

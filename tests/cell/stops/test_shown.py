@@ -253,12 +253,12 @@ def fails(*_: Any) -> None:
     raise OSError(28, "No space left on device")
 
 
-@pytest.mark.parametrize("call", ["fdatasync", "open"])
+@pytest.mark.parametrize("call", ["fsync", "open"])
 def test_what_the_disk_refuses_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
     refuse: Callable[..., None] = fails
-    monkeypatch.setattr(f"app.cell.stops.shown.os.{call}", refuse)
+    monkeypatch.setattr(f"app.system.whole_file.os.{call}", refuse)
     with pytest.raises(LogError, match="No space left on device"):
         write(tmp_path, small(at=time.time()))
     assert not list((tmp_path / FOLDER).glob("*.gz"))
