@@ -9,14 +9,27 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 LOCKS = ("deploy/requirements.lock", "tests/requirements.lock", "docs/requirements.lock")
 COMMAND = ("-m", "pip_audit", "--disable-pip", "--require-hashes", "--progress-spinner=off")
 
 
-def audit(lock: Path) -> tuple[list[str], list[str]]:
+class Weakness(NamedTuple):
+    """A known weakness of a locked package, and the versions in which it is fixed."""
+
+    package: str
+    version: str
+    id: str
+    fixed: tuple[str, ...]
+
+    def __str__(self) -> str:
+        fixed = ", ".join(self.fixed) or "no version"
+        return f"{self.package} {self.version}: {self.id}, fixed in {fixed}"
+
+
+def audit(lock: Path) -> tuple[list[Weakness], list[str]]:
     """The known weaknesses of a lock file, and what could not be checked."""
     command = [sys.executable, *COMMAND, "--format=json", "--requirement", str(lock)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -26,8 +39,7 @@ def audit(lock: Path) -> tuple[list[str], list[str]]:
         last = (done.stderr.strip().splitlines() or ["pip-audit printed nothing"])[-1]
         return [], [f"{lock.name}: {last}"]
     weak = [
-        f"{each['name']} {each['version']}: {weakness['id']},"
-        f" fixed in {', '.join(weakness['fix_versions']) or 'no version'}"
+        Weakness(each["name"], each["version"], weakness["id"], tuple(weakness["fix_versions"]))
         for each in report["dependencies"]
         for weakness in each.get("vulns", ())
     ]
@@ -40,7 +52,7 @@ def audit(lock: Path) -> tuple[list[str], list[str]]:
 
 
 def main(locks: Sequence[str]) -> int:
-    weak: dict[str, None] = {}
+    weak: dict[Weakness, None] = {}
     unchecked: dict[str, None] = {}
     for lock in locks or [str(ROOT / name) for name in LOCKS]:
         some, others = audit(Path(lock))

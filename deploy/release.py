@@ -1,12 +1,14 @@
 """`python deploy/release.py FOLDER [--tag TAG]`: the files of a release, each checked.
 
-FOLDER gets the wheel, the sdist, the SBOM (CycloneDX), the documentation as a site, the locked
-dependencies and SHA256SUMS. If RELEASE_KEY names a secret key of minisign, the wheel and SHA256SUMS are
-signed with it. The version is that of pyproject.toml. Exit status 1: what is wrong is printed.
+FOLDER gets the wheel, the sdist, the SBOM (CycloneDX), the VEX file (OpenVEX), the documentation as a
+site, the locked dependencies and SHA256SUMS. If RELEASE_KEY names a secret key of minisign, the wheel,
+the VEX file and SHA256SUMS are signed with it. The version is that of pyproject.toml. Exit status 1:
+what is wrong is printed.
 """
 
 import argparse
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -18,12 +20,19 @@ import time
 import tomllib
 import urllib.request
 import venv
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parent.parent
+if __name__ == "__main__":  # its folder is on the path, and not that of the checkout
+    sys.path.insert(0, str(ROOT))
+
+from deploy import vex  # noqa: E402
+from deploy.audit import audit  # noqa: E402
+
 LOCK = ROOT / "deploy/requirements.lock"
 SITE = ROOT / "build/docs"
 STARTS_WITHIN_S = 60
@@ -100,6 +109,23 @@ def describe(folder: Path) -> None:
     run("-m", "cyclonedx_py", "requirements", *arguments, "-o", str(target), str(LOCK))
 
 
+def judge(folder: Path, tag: str | None) -> Path:
+    """The VEX file. ReleaseError for a known weakness that deploy/vex.toml does not judge, and for a
+    tag also where the data of known weaknesses was not reached."""
+    statements = vex.judgements()
+    weak, unchecked = audit(LOCK)
+    if left := vex.unjudged(weak, statements):
+        raise ReleaseError("deploy/vex.toml does not judge:\n" + "\n".join(map(str, left)))
+    if unchecked and tag is not None:
+        raise ReleaseError(f"not known which weaknesses there are: {unchecked[0]}")
+    if unchecked:
+        print(f"the VEX file may lack weaknesses: {unchecked[0]}", file=sys.stderr)
+    target = folder / f"operator_panel-{version()}.vex.json"
+    document = vex.document(version(), statements, vex.locked(LOCK), datetime.now(UTC))
+    target.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    return target
+
+
 def pack_docs(folder: Path) -> None:
     if not (SITE / "index.html").is_file():
         raise ReleaseError(f"{SITE} has no documentation: `make docs` writes it")
@@ -162,9 +188,9 @@ def write_sums(folder: Path) -> None:
     (folder / "SHA256SUMS").write_text("".join(f"{digest(path)}  {path.name}\n" for path in files))
 
 
-def sign(folder: Path, wheel: Path, key: str) -> None:
-    """Signatures of the wheel and of all files by their sums. minisign asks for the key's password."""
-    for path in (wheel, folder / "SHA256SUMS"):
+def sign(files: Iterable[Path], key: str) -> None:
+    """Signatures of these files. minisign asks for the key's password."""
+    for path in files:
         comment = f"operator-panel {version()} {path.name} sha256:{digest(path)}"
         try:
             subprocess.run(["minisign", "-S", "-s", key, "-m", str(path), "-t", comment], check=True)
@@ -196,14 +222,15 @@ def main() -> int:
         empty(options.folder)
         wheel = build(options.folder)
         describe(options.folder)
+        weaknesses = judge(options.folder, options.tag)
         pack_docs(options.folder)
         write_sums(options.folder)
         try_out(wheel)
         if key := os.environ.get("RELEASE_KEY"):
-            sign(options.folder, wheel, key)
+            sign((wheel, weaknesses, options.folder / "SHA256SUMS"), key)
         else:
             print("not signed: RELEASE_KEY names no secret key of minisign", file=sys.stderr)
-    except ReleaseError as error:
+    except (ReleaseError, vex.VexError) as error:
         print(error, file=sys.stderr)
         return 1
     print("".join(f"{path}\n" for path in sorted(options.folder.iterdir())), end="")

@@ -1,5 +1,6 @@
 """What a release's VEX file says of the installed software, offline: which weaknesses concern it, in
-the form of OpenVEX 0.2.0.
+the form of OpenVEX 0.2.0. A list of statements that is empty is read too: a release of which no
+weakness is known has one, with its time.
 
 Source: https://github.com/openvex/spec/blob/main/OPENVEX-SPEC.md
 """
@@ -102,8 +103,8 @@ def parse_vex(data: Any) -> Vex:
         raise ValueError(f'"@context" must begin with {CONTEXT}')
     at = _time(document, "the document")
     statements = document.get("statements")
-    if not isinstance(statements, list) or not statements:
-        raise ValueError('"statements" must be a list with one entry at least')
+    if not isinstance(statements, list):
+        raise ValueError('"statements" must be a list')
     read = tuple(_statement(each, f"statements[{n}]", at) for n, each in enumerate(statements))
     return Vex(_text(document, "author", "the document"), at, read)
 
@@ -197,5 +198,5 @@ def is_meant(purl: str, component: Component) -> bool:
     name, version = unquote(name), unquote(version)
     if kind.lower() == PYPI:
         name = package_name(name)
-    same = (kind.lower(), name) == (component.kind, component.name)
+    same = (kind.lower(), name) == (component.kind, component.full_name)
     return same and version in ("", component.version)

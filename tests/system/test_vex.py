@@ -40,6 +40,11 @@ def judged(*statements: Any) -> list[tuple[str, str, str]]:
     return [(each.weakness, each.component.name, each.status) for each in told]
 
 
+def test_a_file_without_statements_has_its_time() -> None:
+    vex = parse_vex(document())
+    assert (vex.statements, vex.at.date().isoformat()) == ((), "2026-11-01")
+
+
 DO: Final = {"action_statement": "Update to 0.2.1."}
 IN_PANEL: Final = product("pkg:pypi/operator-panel@0.2.0", "pkg:pypi/pillow@12.0.0")
 
@@ -100,7 +105,7 @@ def test_a_purl_names_a_package_as_indexes_compare_it(purl: str, expected: bool)
         ("[" * 100_000, "is not JSON"),
         ("[]", "the document must be an object"),
         (json.dumps(document(**{"@context": "https://cyclonedx.org"})), '"@context" must begin with'),
-        (json.dumps(document()), '"statements" must be a list'),
+        (json.dumps(document(statements={})), '"statements" must be a list'),
         (json.dumps(document(statement("affected", IN_PANEL))), "has no action_statement"),
         (json.dumps(document(statement("not_affected", IN_PANEL))), "has no justification"),
         (json.dumps(document(statement("good", IN_PANEL))), "status must be one of affected"),

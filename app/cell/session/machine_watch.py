@@ -5,9 +5,10 @@ weaknesses concern what is installed, which newer release is there, and whether 
 import asyncio
 import json
 import logging
+import re
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -29,7 +30,7 @@ from app.panel.rules import LogRules
 from app.records.entry import Entry, Kind, new_entry
 from app.records.room import LogRoom, log_room
 from app.system.errors import LogError, SettingsError, os_error_text
-from app.system.inventory import installed
+from app.system.inventory import installed, system_packages
 from app.system.minisign import SIGNATURE_SUFFIX
 from app.system.releases import NewRelease, newest_release
 from app.system.texts import Text, TextLike, joined, say
@@ -59,7 +60,10 @@ class WatchedLog(Protocol):
     def add(self, entry: Entry) -> None: ...
 
 
-VEX: Final = "vex.json"  # beside the panel file, or in the data folder
+# Beside the panel file, in the data folder, or where newer releases are put: what a maker has written,
+# or else the file of the newest release.
+VEX: Final = "vex.json"
+RELEASE_VEX: Final = "operator_panel-*.vex.json"
 UPDATES: Final = "updates"  # the folder of newer releases, beside the panel file
 POSTPONED: Final = "update-notice.json"  # in the data folder
 MOST_FILES: Final = 200
@@ -74,7 +78,7 @@ class MachineReader:
     def __init__(self, panel: Path, data: Path, keys: Path, rules: LogRules) -> None:
         """`panel` and `data` are the folders of the panel file and of the data, `keys` the public keys
         of releases. `rules` are those of the operator's log."""
-        self._folders = panel, data
+        self._folders = panel, data, panel / UPDATES
         self._data = data
         self._updates = panel / UPDATES
         self._keys = keys
@@ -120,7 +124,7 @@ class MachineReader:
 
     def _vex(self) -> Weaknesses | None:
         """Judged again when one of the files has changed, and each hour."""
-        file = next((file for each in self._folders if (file := each / VEX).is_file()), None)
+        file = vex_file(self._folders)
         if file is None:
             return None
         signature = file.with_name(file.name + SIGNATURE_SUFFIX)
@@ -130,13 +134,25 @@ class MachineReader:
         return self._weaknesses[2]
 
 
+def vex_file(folders: Iterable[Path]) -> Path | None:
+    """The VEX file that counts; None without one."""
+    places = list(folders)
+    own = next((file for folder in places if (file := folder / VEX).is_file()), None)
+    shipped = (file for folder in places for file in folder.glob(RELEASE_VEX) if file.is_file())
+    return own or max(shipped, key=_release_number, default=None)
+
+
+def _release_number(file: Path) -> list[int]:
+    return [int(number) for number in re.findall(r"[0-9]+", file.name)]
+
+
 def judged(file: Path, keys: Path) -> Weaknesses:
     """What a signed VEX file says of what is installed. Blocks."""
     try:
         vex, _ = read_signed_vex(file, keys)
     except SettingsError as error:
         return Weaknesses(file, fault=str(error))
-    judgements = verdicts(vex, installed())
+    judgements = verdicts(vex, (*installed(), *system_packages()))
     affected = [verdict for verdict in judgements if verdict.status == "affected"]
     investigated = sum(verdict.status == "under_investigation" for verdict in judgements)
     return Weaknesses(file, affected, investigated)

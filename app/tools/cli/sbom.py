@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.system.errors import KioskError
-from app.system.inventory import Component, cyclonedx, installed
+from app.system.inventory import Component, cyclonedx, installed, system_packages
 from app.system.minisign import PINNED
 from app.system.vex import STATUSES, Verdict, Vex, read_signed_vex, read_vex, verdicts
 from app.tools.cli.output import add_force, check_absent, draft_of
@@ -25,7 +25,7 @@ UNAFFECTED, AFFECTED, UNKNOWN = range(3)
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
     options = make_parser(prog).parse_args(arguments)
     try:
-        components = installed()
+        components = (*installed(), *(() if options.python_only else system_packages()))
         if options.check is None:
             _write(components, options.output, options.force)
             return UNAFFECTED
@@ -105,14 +105,16 @@ def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Prints what is installed with this program as an SBOM (CycloneDX 1.6): the"
-        " packages of its Python environment, from their own metadata, and the interpreter. With"
-        " --check it compares that with the VEX file of a release (OpenVEX), offline.",
+        " packages of its Python environment, from their own metadata, the interpreter, and on Debian"
+        " and its kin the packages of the operating system. With --check it compares that with"
+        " the VEX file of a release (OpenVEX), offline.",
         epilog="Exit status: 0 nothing installed is affected, 1 something is, 2 a mistake on the"
         " command line, a file that can't be used, or a signature that does not fit.",
     )
     add = parser.add_argument
     add("-o", "--output", type=Path, metavar="FILE", help="default: the SBOM is printed")
     add_force(parser)
+    add("--python-only", action="store_true", help="without the packages of the operating system")
     add(
         "--check",
         type=Path,

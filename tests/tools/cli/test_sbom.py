@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from app.system.inventory import system_packages
 from app.tools.cli.command import main
 from tests.support.signed import Signer
 from tests.system.test_vex import document, product, statement
@@ -39,6 +40,16 @@ def test_it_prints_the_sbom_or_writes_it(tmp_path: Path, capsys: pytest.CaptureF
     assert json.loads(file.read_text()) == printed
     assert main(["sbom", "-o", str(file)]) == 2
     assert "exists" in capsys.readouterr().err
+
+
+def test_packages_of_the_system_can_be_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    kinds: list[set[str]] = []
+    for options in ([], ["--python-only"]):
+        assert main(["sbom", *options]) == 0
+        printed = json.loads(capsys.readouterr().out)
+        kinds.append({each["purl"].partition("/")[0] for each in printed["components"]})
+    own = {"pkg:pypi", "pkg:generic"}
+    assert kinds == [own | ({"pkg:deb"} if system_packages() else set()), own]
 
 
 def test_what_is_affected_ends_with_1_and_says_what_to_do(

@@ -248,7 +248,7 @@ def test_a_python_without_the_library_says_which_command_checks(
 
 def test_a_release_is_signed_as_an_update_checks_it(signer: Signer, wheel: Path) -> None:
     release.write_sums(wheel.parent)
-    release.sign(wheel.parent, wheel, str(signer.secret))
+    release.sign((wheel, wheel.parent / "SHA256SUMS"), str(signer.secret))
     assert release.digest(wheel) in check(wheel, signer)
     assert check_signed(wheel.parent / "SHA256SUMS", parse_keys(signer.text, "keys"))
     release.empty(wheel.parent)
@@ -257,4 +257,4 @@ def test_a_release_is_signed_as_an_update_checks_it(signer: Signer, wheel: Path)
 
 def test_a_release_with_a_key_that_can_not_sign_is_none(wheel: Path) -> None:
     with pytest.raises(release.ReleaseError, match="is not signed"):
-        release.sign(wheel.parent, wheel, str(wheel.parent / "none.key"))
+        release.sign((wheel,), str(wheel.parent / "none.key"))
