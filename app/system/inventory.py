@@ -85,7 +85,7 @@ def system_packages(
         return ()
     system = _system_name(release)
     packages = (_dpkg_fields(paragraph) for paragraph in text.split("\n\n"))
-    found = {
+    components = {
         Component(
             about["Package"],
             about["Version"],
@@ -96,7 +96,7 @@ def system_packages(
         for about in packages
         if about.get("Status", "").endswith(" installed") and {"Package", "Version"} <= about.keys()
     }
-    return tuple(sorted(found, key=lambda package: package.purl))
+    return tuple(sorted(components, key=lambda package: package.purl))
 
 
 def _dpkg_fields(paragraph: str) -> dict[str, str]:

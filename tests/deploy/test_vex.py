@@ -109,8 +109,8 @@ def test_the_panel_finds_the_file_of_the_newest_release(
     signer = Signer(tmp_path / "keys")
     signer.sign(file)
     assert vex_file(folders) == file
-    found = judged(file, signer.public)
-    assert (found.fault, list(found.affected), found.investigated) == ("", [], 0)
+    weaknesses = judged(file, signer.public)
+    assert (weaknesses.fault, list(weaknesses.affected), weaknesses.investigated) == ("", [], 0)
     for name in ("operator_panel-0.9.0.vex.json", "operator_panel-0.10.0.vex.json"):
         (folders[0] / name).touch()
     assert vex_file(folders) == folders[0] / "operator_panel-0.10.0.vex.json"

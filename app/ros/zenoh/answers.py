@@ -47,7 +47,7 @@ def direct(
     function: Callable[[Event], None], on_end: Callable[[], None] | None = None
 ) -> "Callback[Event]":
     """A handler that runs on Zenoh's receiving thread. What `function` raises is counted and logged,
-    and the next event arrives. Every callback of the package is one of these."""
+    and the next event arrives."""
 
     def handle(event: Event) -> None:
         attach()

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import zenoh
 from zenoh.ext import CacheConfig, declare_advanced_publisher
+from zenoh.handlers import Callback
 
 from app.panel.model import Panel, RobotEntry
 from app.ros.dialects import bridge_dialect
@@ -29,7 +30,6 @@ from app.ros.dialects.dialect import (
 )
 from app.ros.dialects.rmw_zenoh import RmwZenohDialect, is_whole, parse_attachment
 from app.ros.messages import Interfaces, names
-from app.ros.zenoh.answers import direct
 from app.system.errors import DecodeError, KioskError, LinkError
 from app.tools.simulator.known_types import Moment
 from app.tools.simulator.robot import ActionServer, SimulatedRobot
@@ -123,7 +123,7 @@ class Wire:
 
         return self._session.declare_subscriber(
             self._dialect.topic(key, type_name),
-            direct(on_sample),
+            Callback(on_sample, indirect=False),
             allowed_origin=zenoh.Locality.REMOTE,
         )
 
@@ -148,7 +148,7 @@ class Wire:
                 query.drop()
 
         return self._session.declare_queryable(
-            self._dialect.service(key, type_name), direct(handle), complete=True
+            self._dialect.service(key, type_name), Callback(handle, indirect=False), complete=True
         )
 
     def reply(self, query: zenoh.Query, key: str, type_name: str, payload: bytes) -> None:
@@ -526,7 +526,7 @@ def _admin_value(session: zenoh.Session, key: str, text: str) -> Any:
         with query:
             query.reply(key, text)
 
-    return session.declare_queryable(key, direct(answer), complete=True)
+    return session.declare_queryable(key, Callback(answer, indirect=False), complete=True)
 
 
 def _listening(endpoint: str) -> zenoh.Config:
