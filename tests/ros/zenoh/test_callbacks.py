@@ -92,8 +92,8 @@ def test_a_server_in_whose_log_such_an_error_is_fails_its_test() -> None:
 
 
 def test_the_package_has_no_other_callbacks() -> None:
-    """Each of Zenoh's handlers is one of `direct`, but those of the simulator, which knows nothing of the
-    server."""
+    """Each of Zenoh's handlers is one of `direct`, but those of the simulator: it knows nothing of
+    the server."""
     made = re.compile(r"\bCallback\(")
     files = {path for path in (ROOT / "app").rglob("*.py") if made.search(path.read_text())}
     assert files == {ROOT / "app/ros/zenoh/answers.py", ROOT / "app/tools/simulator/zenoh.py"}
