@@ -15,7 +15,7 @@ from tests.support.browser.browsers import ReusedPage
 from tests.support.editor import PANEL, EditorServer, box_of, editing, middle, preview
 from tests.support.parts import until
 
-SPEED: Final = ["page", 0, "group", 0, "widget", 0]
+SPEED: Final[list[str | int]] = ["page", 0, "group", 0, "widget", 0]
 READY: Final = ["page", 0, "group", 0, "widget", 1]
 OPEN: Final = ["page", 0, "group", 1, "widget", 0]
 CHOSEN: Final = ".tr[aria-selected='true']"
