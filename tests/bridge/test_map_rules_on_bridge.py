@@ -51,7 +51,10 @@ y = 0.75
 level = "upper"
 """
 MASK: Final = """
-layer = [{ shows = "keep_out", topic = "/keepout_mask", info = "/keepout_info" }]
+layer = [
+  { shows = "keep_out", topic = "/keepout_mask", info = "/keepout_info" },
+  { shows = "speed", topic = "/speed_mask", info = "/speed_info" },
+]
 """
 AROUND_MASK: Final = """
 [[place]]
@@ -125,7 +128,7 @@ def test_the_robot_chooses_the_level_and_a_goal_on_another_one_is_refused(
         assert len(robot.heard("/goal_pose")) == 2
 
 
-def test_a_goal_on_the_mask_of_a_keepout_filter_is_refused(
+def test_a_goal_on_the_mask_of_a_keepout_filter_is_refused_and_speed_limits_are_named(
     own_cyclone_bridge: Bridge,
     own_client: Client,
     cyclone_robots: Callable[..., CycloneRobot],
@@ -137,6 +140,8 @@ def test_a_goal_on_the_mask_of_a_keepout_filter_is_refused(
     publish_grid(robot, "/map", [0] * 64)
     robot.advertise("/keepout_mask", GRID, **LATCHED)
     publish_grid(robot, "/keepout_mask", [100 if n == 54 else 0 for n in range(64)])
+    robot.advertise("/speed_mask", GRID, **LATCHED)
+    publish_grid(robot, "/speed_mask", [40 if n == 18 else 60 if n > 60 else 0 for n in range(64)])
     text = f'interfaces = ["{NAV2}"]\n{PANEL}{WITH_TOPIC}{MASK}{DRIVE}{AROUND_MASK}'
     with live_server(own_cyclone_bridge, tmp_path, text) as kiosk:
         until(lambda: kiosk.widget("hall")["grid"], "the map is read")
@@ -144,6 +149,9 @@ def test_a_goal_on_the_mask_of_a_keepout_filter_is_refused(
         nav2.advertise(topic="/keepout_info", type="nav2_msgs/msg/CostmapFilterInfo", **LATCHED)
         nav2.filter_info(topic="/keepout_info", mask="/keepout_mask")
         until(lambda: kiosk.widget("hall")["layer_0"]["state"] == "live", "the mask is drawn")
+        nav2.advertise(topic="/speed_info", type="nav2_msgs/msg/CostmapFilterInfo", **LATCHED)
+        nav2.filter_info(topic="/speed_info", mask="/speed_mask", kind=1)
+        until(lambda: kiosk.widget("hall")["layer_1"]["note"] == "Limits: 40 %, 60 %", "it names them")
         until(lambda: is_sent(kiosk, robot, "free"), "a goal beside it is sent")
         assert "may not enter Keep-out mask" in refusal(kiosk, robot, "closed")
         until(lambda: len(robot.heard("/goal_pose")) == 1, "the goal has arrived")

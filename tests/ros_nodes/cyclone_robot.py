@@ -186,10 +186,10 @@ class Commands:
         update = OccupancyGridUpdate(header, x, y, width, len(data) // width, data)
         self._node.published[topic].write(update)
 
-    def filter_info(self, topic: str, mask: str) -> None:
-        """Publishes that a mask is of a keepout filter."""
+    def filter_info(self, topic: str, mask: str, kind: int = 0) -> None:
+        """Publishes of which filter a mask is: of a keepout filter (0), or of speeds in percent (1)."""
         header = Header(Time.at(time.time_ns()), "map")
-        self._node.published[topic].write(CostmapFilterInfo(header, 0, mask, 0.0, 1.0))
+        self._node.published[topic].write(CostmapFilterInfo(header, kind, mask, 0.0, 1.0))
 
     def transform(self, topic: str, parent: str, child: str, x: float, hz: float = 0.0) -> None:
         """Publishes where a frame is in another one: once, or so many times a second with the time of

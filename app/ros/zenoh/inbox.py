@@ -57,20 +57,27 @@ class Token:
     lost_before: int = 0
 
 
+class Cache(NamedTuple):
+    """The cache of a topic's publisher, by its token, from which the last message has to be fetched.
+    `lost`: one that was published after the last that arrived."""
+
+    key: str
+    token: str
+    lost: bool = False
+
+
 @dataclass(slots=True)
 class Changes:
     """Samples and tokens received since the last drain. `samples` has the newest of each topic, by key;
     `recorded_samples` has every sample of the recorded topics, and the changes of the changing ones.
-    `caches` are (key, token) of the publishers that keep their last message for late subscribers,
-    `behind` those that have published more than has arrived.
+    `caches` are those of publishers that are new, or have published more than has arrived.
     `reopen`: the session has to be opened again."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
     link_up: bool
     recorded_samples: Collection[tuple[str, Sample]] = ()
-    caches: Collection[tuple[str, str]] = ()
-    behind: Collection[tuple[str, str]] = ()
+    caches: Collection[Cache] = ()
     reopen: bool = False
 
 
@@ -144,8 +151,7 @@ class Inbox:
         self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
         self._numbers: dict[tuple[str, str], int] = {}  # (key, publisher) → of its last message
-        self._caches: list[tuple[str, str]] = []
-        self._behind: list[tuple[str, str]] = []
+        self._caches: list[Cache] = []
         self._transports: set[str] = set()
         self._kept = _kept_samples()
 
@@ -208,14 +214,13 @@ class Inbox:
             self._woken = self._has_immediate = False
             samples, self._samples = self._samples, {}
             if self._idle_samples and (
-                whole or self._tokens or self._caches or self._behind or self._connections_changed
+                whole or self._tokens or self._caches or self._connections_changed
             ):
                 samples |= self._idle_samples
                 self._idle_samples = {}
             self._connections_changed = False
             tokens, self._tokens = self._tokens, {}
             caches, self._caches = self._caches, []
-            behind, self._behind = self._behind, []
             kept, self._kept = self._kept, _kept_samples()
             link_up = bool(self._transports)
         is_due = bool(samples) and time.monotonic() >= self._timed_until
@@ -227,7 +232,6 @@ class Inbox:
             link_up,
             [(key, arrived.sample(timed=True)) for key, arrived in kept] if kept else (),
             caches,
-            behind,
         )
 
     @property
@@ -293,19 +297,16 @@ class Inbox:
             token.lost_seq = seq
         self._wake(True)
 
-    def cache(self, key: str, token: str) -> None:
-        """The token of a cache of a topic's publisher appeared."""
-        self._caches.append((key, token))
+    def cache(self, key: str, token: str, lost: bool = False) -> None:
+        """The token of a cache of a topic's publisher appeared, or a message of it was lost."""
+        self._caches.append(Cache(key, token, lost))
         self._wake(True)
 
     def last_number(self, key: str, token: str, last: Number) -> None:
         """The publisher with this cache says which message was its last."""
         known = self._numbers.get((key, last.publisher))
-        if known is None:
-            self.cache(key, token)
-        elif last.is_after(known):
-            self._behind.append((key, token))
-            self._wake(True)
+        if known is None or last.is_after(known):
+            self.cache(key, token, lost=known is not None)
 
     def publisher_lost(self, key: str, publisher: str) -> None:
         """A publisher with numbers is gone."""

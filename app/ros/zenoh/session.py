@@ -269,8 +269,10 @@ class ZenohSession:
         )
 
     def subscribe_on_demand(self, key: str, expression: str, on_payload: OnPayload) -> None:
-        """Subscribes to a topic until `unsubscribe`, in this session and those after it. `on_payload`
-        is called on Zenoh's threads, under the inbox's lock: it must not block."""
+        """Subscribes to a stream until `unsubscribe`, in this session and those after it: pictures of a
+        camera, `/clock`. Neither a latched message nor a lost one is asked for: the next of the stream
+        takes its place, and a stream that stops is old. `on_payload` is called on Zenoh's threads,
+        under the inbox's lock: it must not block."""
         self._on_demand[key] = expression, on_payload
         if self._held is None:
             return  # the new session subscribes
@@ -432,12 +434,10 @@ class ZenohSession:
         if not self._is_final:  # a peer that waited for something to be a client of
             changes.link_up, changes.reopen = False, changes.link_up
         # Not in the callbacks, which must not query.
-        for key, token in changes.caches:
+        for key, token, lost in changes.caches:
             if numbered_publisher(token):
                 self._hear_numbers(key)
-            self._ask_cache(key, token)
-        for key, token in changes.behind:
-            if self._losses.has_token(key):
+            if lost and self._losses.has_token(key):
                 self._losses.take_token(key)
                 log.warning(
                     "more was published on %s than has arrived: the last message is asked for", key

@@ -42,6 +42,7 @@ log = logging.getLogger("kiosk.simulator")
 NODE: Final = "system_controller"
 # Where the panel file does not say how the robot is reached, the simulated one has a bridge.
 BEHIND_BRIDGE: Final[frozenset[DialectName]] = frozenset({"auto", "bridge"})
+NUMBERED: Final = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5)  # rmw_zenoh's
 Answer = Callable[[bytes], bytes | None]
 # (domain, interfaces, distribution) → the dialect of a robot.
 MakeDialect = Callable[[int, Interfaces, str], Dialect]
@@ -94,7 +95,8 @@ class Wire:
 
     def publisher(self, key: str, type_name: str, *, latched: bool = False) -> Callable[[bytes], None]:
         """A function that publishes. A latched publisher keeps its last message for subscribers that
-        come late, and does not repeat it: Zenoh must not drop it where a connection is slow."""
+        come late, and does not repeat it: Zenoh must not drop it where a connection is slow. A node on
+        rmw_zenoh also numbers its messages, and says which was the last."""
         expression = self._dialect.topic(key, type_name)
         declared: Any = (
             declare_advanced_publisher(
@@ -102,6 +104,7 @@ class Wire:
                 expression,
                 cache=CacheConfig(max_samples=1),
                 publisher_detection=True,
+                sample_miss_detection=None if self.has_bridge else NUMBERED,
                 congestion_control=zenoh.CongestionControl.BLOCK,
             )
             if latched

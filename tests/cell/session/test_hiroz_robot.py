@@ -14,9 +14,11 @@ import pytest
 from PIL import Image
 
 from app.cell.session.session import RobotSession
+from tests.bridge.test_goals_on_bridge import press
 from tests.cell.session.test_rmw_zenoh import asked, enabled, link, session_with
 from tests.support.builders import ENABLED, GUARDED, MESSAGE, panel_of, press_widget
-from tests.support.parts import Process, until
+from tests.support.cyclone import NAV2
+from tests.support.parts import Process, Server, until
 from tests.support.rmw import RmwNode, Router
 from tests.support.servers import live_server
 from tests.support.waiting import when
@@ -98,6 +100,52 @@ max_age_s = 1.0
 """
 CELL_M: Final = 0.1
 LEFT, TOP = -2.0, 2.0  # of the map, in metres
+
+
+ON_LEVELS: Final = f"""
+interfaces = ["{NAV2}"]
+{DRIVEN.split("[[page.widget.layer]]", maxsplit=1)[0]}
+radius = 0.1
+robot_level = {{ topic = "/level", type = "std_msgs/msg/String" }}
+level = [
+  {{ id = "ground", label = "Ground floor", topic = "/map" }},
+  {{ id = "upper", label = "Upper floor", topic = "/upper/map" }},
+]
+layer = [
+  {{ shows = "keep_out", topic = "/keepout_mask", info = "/keepout_info" }},
+  {{ shows = "speed", topic = "/speed_mask", info = "/speed_info" }},
+]
+[[page.widget]]
+id = "goal"
+kind = "place"
+label = "Places"
+map = "hall"
+[[page.widget]]
+id = "drive"
+kind = "publish"
+label = "Drive"
+topic = "/goal_pose"
+type = "geometry_msgs/msg/PoseStamped"
+message = {{ header = {{ frame_id = "{{goal.frame}}", stamp = "{{now}}" }}, pose = "{{goal.pose}}" }}
+[[page.widget]]
+id = "word"
+kind = "text"
+label = "Word"
+[[page.widget]]
+id = "order"
+kind = "publish"
+label = "Order"
+topic = "/operation"
+type = "std_msgs/msg/String"
+message = {{ data = "{{word}}" }}
+""" + "".join(
+    f'[[place]]\nid = "{name}"\nlabel = "{name.title()}"\nx = {x}\ny = 0.0\nlevel = "{level}"\n'
+    for name, x, level in (
+        ("dock", 0.5, "ground"),
+        ("closed", -1.5, "ground"),
+        ("archive", 0.5, "upper"),
+    )
+)
 
 
 def shown(session: RobotSession, widget: str) -> Any:
@@ -188,3 +236,39 @@ def test_its_map_transforms_at_50_hz_and_scan_at_10_hz_fit_each_other(
         robot.send(signal.SIGKILL)
         until(lambda: kiosk.widget("hall")["state"] == "old", "without transforms it is old")
         assert kiosk.widget("hall")["pose"] == [x, y, yaw]
+
+
+@pytest.fixture
+def driver(router: Router) -> Iterator[RmwNode]:
+    mine = RmwNode(router, "driver")
+    yield mine
+    mine.end()
+
+
+def test_its_levels_and_masks_decide_about_goals(
+    router: Router, robot: Process, driver: RmwNode, tmp_path: Path
+) -> None:
+    with live_server(router, tmp_path, ON_LEVELS) as kiosk:
+        driver.subscribe("/goal_pose", "geometry_msgs/msg/PoseStamped")
+        until(lambda: all(row["grid"] for row in kiosk.widget("hall")["levels"]), "both maps are read")
+        assert press(kiosk, "drive", "dock")[0] == 409  # it is not known where the robot is
+        order(kiosk, robot, "level ground")
+        until(lambda: kiosk.widget("hall")["level"] == "ground", "the robot is there")
+        until(lambda: kiosk.widget("hall")["layer_1"]["note"] == "Limits: 40 %", "the limit is named")
+        until(lambda: press(kiosk, "drive", "dock")[0] == 200, "a goal on its level is sent")
+        status, reason = press(kiosk, "drive", "archive")
+        assert (status, "The robot is on" in reason) == (409, True), reason
+        status, reason = press(kiosk, "drive", "closed")
+        assert (status, "may not enter Keep-out mask" in reason) == (409, True), reason
+        order(kiosk, robot, "clear")
+        until(lambda: press(kiosk, "drive", "closed")[0] == 200, "the zone is free")
+        order(kiosk, robot, "level upper")
+        until(lambda: press(kiosk, "drive", "archive")[0] == 200, "it is on the other level")
+        assert press(kiosk, "drive", "dock")[0] == 409
+        until(lambda: len(driver.heard("/goal_pose")) == 3, "what was sent has arrived, once")
+
+
+def order(kiosk: Server, robot: Process, word: str) -> None:
+    answer = kiosk.http.post("/widgets/order", json={"inputs": {"word": word}})
+    assert answer.status_code == 200, answer.text
+    until(lambda: f"heard {word}" in robot.text, "the robot has it")

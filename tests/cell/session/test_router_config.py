@@ -5,7 +5,7 @@ import asyncio
 import json
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -43,6 +43,13 @@ topic = "/operation"
 type = "std_msgs/msg/String"
 message = { data = "{message}" }
 interlock = "operation"
+[[page.widget]]
+id = "order"
+kind = "publish"
+label = "Order"
+topic = "/operation"
+type = "std_msgs/msg/String"
+message = { data = "{message}" }
 [[page.widget]]
 id = "mode"
 kind = "publish"
@@ -188,13 +195,43 @@ def test_the_last_value_of_a_latched_topic_is_asked_for_if_it_was_dropped(
     assert "operation_enabled" in line, "one line a minute, though each change is lost"
 
 
-@pytest.fixture
-def robot(hiroz: Path, router: Router) -> Iterator[Process]:
+def test_what_was_dropped_of_a_node_on_hiroz_is_asked_for(
+    dropping_router: Router, door: str, panel: Path, hiroz: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its makers number its messages by zenoh-ext, as rmw_zenoh_cpp does."""
+
+    async def scene() -> None:
+        async with session_by(door, panel) as session:
+            with hiroz_robot(hiroz, dropping_router) as robot:
+
+                async def order(word: str) -> None:
+                    sent = await press_widget(session.presses, "order", {"message": word}, word)
+                    assert sent.outcome == "published", sent.reason
+                    await when(lambda: f"heard {word}" in robot.text, "the robot has it")
+
+                await when(partial(enabled, session, "say"), "its latched permission came")
+                await when(partial(enabled, session, "order"))
+                await order("permit")  # the first that passes the router
+                await order("forbid")
+                await when(lambda: not enabled(session, "say"), "what was dropped is asked for")
+
+    asyncio.run(scene())
+    assert [line for line in caplog.messages if "operation_enabled than has arrived" in line]
+
+
+@contextmanager
+def hiroz_robot(hiroz: Path, router: Router) -> Iterator[Process]:
     mine = Process([str(hiroz), router.endpoint], {})
     until(lambda: "running" in mine.text or not mine.running, "it runs")
     assert mine.running, mine.text
     yield mine
     mine.kill()
+
+
+@pytest.fixture
+def robot(hiroz: Path, router: Router) -> Iterator[Process]:
+    with hiroz_robot(hiroz, router) as mine:
+        yield mine
 
 
 @asynccontextmanager

@@ -1,18 +1,23 @@
 //! A robot for the tests, on hiroz: keys, tokens, attachments and hashes are those of its makers.
 //!
 //! `test-rmw-robot ENDPOINT [DOMAIN]` runs until it is killed. It permits operation, says back what it
-//! hears, adds two numbers, counts Fibonacci's and has one parameter. It is on a map, with transforms at
-//! 50 Hz and a scan at 10 Hz.
+//! hears, adds two numbers, counts Fibonacci's and has one parameter. It is on a map of two levels with
+//! masks, with transforms at 50 Hz and a scan at 10 Hz. "permit", "forbid", "level NAME" and "clear" (the
+//! keep-out mask) do what they say.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use hiroz::action::server::ExecutingGoal;
 use hiroz::context::ZContextBuilder;
+use hiroz::dynamic::{FieldType, MessageSchema, MessageSchemaTypeDescription};
+use hiroz::entity::TypeHash;
 use hiroz::parameter::{IntegerRange, ParameterDescriptor, ParameterType, ParameterValue};
 use hiroz::qos::{QosDurability, QosHistory, QosProfile};
 use hiroz::node::ZNode;
-use hiroz::{Builder, Result};
+use hiroz::ros_msg::WithTypeInfo;
+use hiroz::{Builder, MessageTypeInfo, Result};
+use hiroz_cdr::{CdrBuffer, CdrDeserialize, CdrReader, CdrSerialize, CdrSerializedSize, CdrWriter};
 use hiroz_msgs::builtin_interfaces::Time;
 use hiroz_msgs::example_interfaces::action::Fibonacci;
 use hiroz_msgs::example_interfaces::srv::AddTwoInts;
@@ -55,12 +60,90 @@ fn transform(parent: &str, child: &str, x: f64, y: f64, rotation: Quaternion) ->
     TFMessage { transforms: vec![stamped] }
 }
 
+/// Of nav2_msgs, which hiroz-msgs has not.
+struct CostmapFilterInfo {
+    header: Header,
+    kind: u8,
+    filter_mask_topic: String,
+    base: f32,
+    multiplier: f32,
+}
+
+impl MessageTypeInfo for CostmapFilterInfo {
+    fn type_name() -> &'static str {
+        "nav2_msgs::msg::dds_::CostmapFilterInfo_"
+    }
+
+    fn type_hash() -> TypeHash {
+        let header = FieldType::Message(Header::message_schema().expect("a schema"));
+        let schema = MessageSchema::builder("nav2_msgs/msg/CostmapFilterInfo")
+            .field("header", header)
+            .field("type", FieldType::Uint8)
+            .field("filter_mask_topic", FieldType::String)
+            .field("base", FieldType::Float32)
+            .field("multiplier", FieldType::Float32)
+            .build()
+            .expect("a schema");
+        let hash = schema.compute_type_hash().expect("a hash");
+        TypeHash::from_rihs_string(&hash.to_rihs_string()).expect("a hash")
+    }
+}
+
+impl WithTypeInfo for CostmapFilterInfo {}
+
+impl CdrSerialize for CostmapFilterInfo {
+    fn cdr_serialize<BO: byteorder::ByteOrder, B: CdrBuffer>(&self, w: &mut CdrWriter<'_, BO, B>) {
+        self.header.cdr_serialize(w);
+        self.kind.cdr_serialize(w);
+        self.filter_mask_topic.cdr_serialize(w);
+        self.base.cdr_serialize(w);
+        self.multiplier.cdr_serialize(w);
+    }
+}
+
+impl CdrDeserialize for CostmapFilterInfo {
+    fn cdr_deserialize<'de, BO: byteorder::ByteOrder>(
+        r: &mut CdrReader<'de, BO>,
+    ) -> hiroz_cdr::Result<Self> {
+        Ok(Self {
+            header: Header::cdr_deserialize(r)?,
+            kind: u8::cdr_deserialize(r)?,
+            filter_mask_topic: String::cdr_deserialize(r)?,
+            base: f32::cdr_deserialize(r)?,
+            multiplier: f32::cdr_deserialize(r)?,
+        })
+    }
+}
+
+impl CdrSerializedSize for CostmapFilterInfo {
+    fn cdr_serialized_size(&self, at: usize) -> usize {
+        let at = self.kind.cdr_serialized_size(self.header.cdr_serialized_size(at));
+        let at = self.filter_mask_topic.cdr_serialized_size(at);
+        self.multiplier.cdr_serialized_size(self.base.cdr_serialized_size(at))
+    }
+}
+
+/// A mask whose cells are percents: for a keep-out filter (0) or a speed filter (1).
+fn filter(kind: u8, topic: &str) -> CostmapFilterInfo {
+    let filter_mask_topic = topic.into();
+    CostmapFilterInfo { header: header("map"), kind, filter_mask_topic, base: 0.0, multiplier: 1.0 }
+}
+
 /// Free floor with one wall, the column at its right edge.
 fn map() -> OccupancyGrid {
+    grid(|n| if n % SIDE == SIDE - 1 { 100 } else { 0 })
+}
+
+/// A mask with this value in the ten columns at its left edge.
+fn mask(value: i8) -> OccupancyGrid {
+    grid(|n| if n % SIDE < 10 { value } else { 0 })
+}
+
+fn grid(cell: impl Fn(usize) -> i8) -> OccupancyGrid {
     let origin = Pose { position: Point { x: -2.0, y: -2.0, z: 0.0 }, orientation: FORWARD };
     let (width, height) = (SIDE as u32, SIDE as u32);
     let info = MapMetaData { map_load_time: Time::default(), resolution: CELL, width, height, origin };
-    let data = (0..SIDE * SIDE).map(|n| if n % SIDE == SIDE - 1 { 100 } else { 0 }).collect();
+    let data = (0..SIDE * SIDE).map(cell).collect();
     OccupancyGrid { header: header("map"), info, data }
 }
 
@@ -79,13 +162,21 @@ fn scan() -> LaserScan {
 /// The robot stands at x = 1.25, y = -0.5 and looks to y.
 fn stand(node: &ZNode, latched: QosProfile) -> Result<()> {
     let grid = node.create_pub::<OccupancyGrid>("/map").with_qos(latched).build()?;
+    let upper = node.create_pub::<OccupancyGrid>("/upper/map").with_qos(latched).build()?;
+    let slow = node.create_pub::<OccupancyGrid>("/speed_mask").with_qos(latched).build()?;
+    let slow_info = node.create_pub::<CostmapFilterInfo>("/speed_info").with_qos(latched).build()?;
+    let keep_info = node.create_pub::<CostmapFilterInfo>("/keepout_info").with_qos(latched).build()?;
     let fixed = node.create_pub::<TFMessage>("/tf_static").with_qos(latched).build()?;
     let moved = node.create_pub::<TFMessage>("/tf").build()?;
     let scanned = node.create_pub::<LaserScan>("/scan").build()?;
     grid.publish(&map())?;
+    upper.publish(&map())?;
+    slow.publish(&mask(40))?;
+    slow_info.publish(&filter(1, "/speed_mask"))?;
+    keep_info.publish(&filter(0, "/keepout_mask"))?;
     fixed.publish(&transform("map", "odom", 0.5, 0.0, FORWARD))?;
     tokio::spawn(async move {
-        let _latched = (grid, fixed); // they keep what late subscribers ask for
+        let _latched = (grid, upper, slow, slow_info, keep_info, fixed); // they keep what late subscribers ask for
         let mut ticks = tokio::time::interval(Duration::from_millis(20));
         for tick in 0_u64.. {
             ticks.tick().await;
@@ -131,12 +222,25 @@ async fn main() -> Result<()> {
     });
 
     stand(&node, latched)?;
+    let level = node.create_pub::<Text>("/level").with_qos(latched).build()?;
+    let keep_out = node.create_pub::<OccupancyGrid>("/keepout_mask").with_qos(latched).build()?;
+    keep_out.publish(&mask(100))?;
 
     let heard = node.create_sub::<Text>("/operation").build()?;
     let last = node.create_pub::<Text>("/last_heard").build()?;
     eprintln!("test-rmw-robot: running");
     while let Ok(text) = heard.async_recv().await {
         eprintln!("heard {}", text.data);
+        match text.data.as_str() {
+            "permit" => enabled.publish(&Bool { data: true })?,
+            "forbid" => enabled.publish(&Bool { data: false })?,
+            "clear" => keep_out.publish(&mask(0))?,
+            other => {
+                if let Some(name) = other.strip_prefix("level ") {
+                    level.publish(&Text { data: name.into() })?;
+                }
+            }
+        }
         last.publish(&text)?;
     }
     Ok(())
