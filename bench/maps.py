@@ -32,8 +32,8 @@ from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, until, zenoh_file
 QUICK: Final = bool(os.environ.get("QUICK"))
 FOR_S: Final = 3.0 if QUICK else 20.0
 SIDE: Final = 1_000 if QUICK else 4_000  # cells of the large map
-MIDDLE: Final = 500  # cells of a map that the rival shows: one of 700 x 700 never comes
-RIVAL_S: Final = 5.0  # between two maps of the rival's node, until one is shown
+MIDDLE: Final = 1_000  # cells of the map that the rival shows
+RIVAL_S: Final = 10.0  # between two maps of the rival's node, until one is shown
 DOMAIN: Final = 77
 EVERY_S: Final = 0.005  # between two requests that wait for the event loop
 INTERFACES: Final = load_interfaces("jazzy")

@@ -13,6 +13,9 @@ from tests.support.parts import free_port
 
 HERE: Final = Path(__file__).parent
 SCRIPTS: Final = CACHE / "pages/rosbridge_map"
+# It takes a cell for more than 128 bytes, and drops what is larger than its queue: by default (64 MiB)
+# a map of 700 x 700.
+QUEUE: Final = ("--write-queue-bytes", str(2**33))
 
 
 class MapNode:
@@ -60,7 +63,7 @@ def is_installed() -> bool:
 def served(place: Place, side: int) -> Iterator[tuple[MapNode, Running]]:
     """The node, and the server with its page."""
     port = free_port()
-    command: list[str | Path] = [PROGRAM, "--bind", f"127.0.0.1:{port}", "--no-rosapi"]
+    command: list[str | Path] = [PROGRAM, "--bind", f"127.0.0.1:{port}", "--no-rosapi", *QUEUE]
     node = MapNode(place, side)
     try:
         process = started(command, environment(place), place.folder)
