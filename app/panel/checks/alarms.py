@@ -190,24 +190,25 @@ def _command_faults(place: str, alarm: Alarm, panel: Panel, faulty: Collection[s
         return
     pressed = {w.id: w for w in panel.commands if isinstance(w, Publish | Call)}
     place_of = f"{place}.ack_command"
-    yield from _reference_faults(place_of, "publish or call", alarm.ack_command, pressed)
+    yield from _reference_faults(place_of, "publish or call", alarm.ack_command, pressed, "control")
     widget = pressed.get(alarm.ack_command)
     if widget is None:
         return
     if alarm.ack != "required":
         yield Fault(place_of, 'is sent when it is acknowledged: leave out ack = "none"')
-    inputs = [name for name in input_ids(widget) if name not in faulty]
-    yield from _reference_faults(
-        f"{place}.ack_input", f'input of "{widget.id}"', alarm.ack_input, inputs
-    )
+    if alarm.ack_input not in faulty:
+        yield from _reference_faults(
+            f"{place}.ack_input", f'input of "{widget.id}"', alarm.ack_input, input_ids(widget)
+        )
 
 
 def _reference_faults(
-    place: str, kind: str, name: str | None, known: Collection[str]
+    place: str, kind: str, name: str | None, known: Collection[str], cause: str = ""
 ) -> Iterator[Fault]:
-    """A fault of a name of something that the panel does not have."""
+    """A fault of a name of something that the panel does not have. `cause` is its kind among the
+    causes, `kind` by default."""
     if name is not None and name not in known:
-        yield Fault(place, no_such(kind, name, known), cause=f"{kind} {name}")
+        yield Fault(place, no_such(kind, name, known), cause=f"{cause or kind} {name}")
 
 
 def _source_faults(place: str, alarm: Alarm, interfaces: Interfaces, language: str) -> Iterator[Fault]:
