@@ -22,6 +22,7 @@ class SameWidget(Description):
     grow: bool | None = None
 
 
+LISTS: Final = ("widget", "group")
 PLACING: Final = tuple(key for key in SameWidget.model_fields if key != NAME)
 
 
@@ -64,7 +65,7 @@ def with_copies(tables: dict[str, Any]) -> WithCopies:
     origins, chains = _origins(tables)
     frame = {table["id"] for table in _tables_at(tables, "frame") if _has_id(table)}
     made = WithCopies({**tables, "page": deepcopy(tables["page"])})
-    no_ids = list(_no_ids(tables))
+    unnamed = list(_unnamed(tables))
     whole = [each for each in _widgets(tables) if NAME not in each[2]]
     seen = {(page, table["id"]): place for page, place, table in reversed(whole) if _has_id(table)}
     for (page, place, table), (_, _, copy) in zip(
@@ -76,9 +77,9 @@ def with_copies(tables: dict[str, Any]) -> WithCopies:
         fault = _fault(table, place, origins, chains, frame) or _twice(name, place, page, seen)
         if fault is not None:
             made.faults.append(fault)
-            if isinstance(name, str) and name not in chains.keys() | origins.keys() and no_ids:
-                made.faults[-1:] = no_ids  # it may be the widget whose id is no text
-                no_ids = []
+            if isinstance(name, str) and name not in chains.keys() | origins.keys() and unnamed:
+                made.faults[-1:] = unnamed  # it may be one of these widgets
+                unnamed = []
             continue
         at, origin = origins[name]
         copy.clear()
@@ -145,11 +146,19 @@ def _origins(
     return origins, chains
 
 
-def _no_ids(tables: Mapping[str, Any]) -> Iterator[Fault]:
-    """The faults of ids that are no text."""
+def _unnamed(tables: Mapping[str, Any]) -> Iterator[Fault]:
+    """The faults of widgets without an id: their list or the key `id` is misspelt, or it is no text."""
+    for p, page in enumerate(_list(tables.get("page"))):
+        for key in page:
+            if key not in LISTS and isinstance(page[key], list) and (near := closest_name(key, LISTS)):
+                yield Fault(f"page[{p}].{key}", f'unknown key; did you mean "{near}"?')
     for _, place, table in _widgets(tables):
         if "id" in table and not _has_id(table):
             yield Fault(f"{place}.id", f"must be text, not {format_value(table['id'])}")
+        elif "id" not in table and NAME not in table:
+            misspelt = next((key for key in table if closest_name(key, ("id",))), None)
+            message = 'unknown key; did you mean "id"?' if misspelt else "is missing"
+            yield Fault(f"{place}.{misspelt or 'id'}", message)
 
 
 def _has_id(table: Mapping[str, Any]) -> bool:

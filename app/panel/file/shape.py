@@ -277,6 +277,8 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
     for fault in error.errors():
         if path := widget_path(fault["loc"]):
             _widget(rest, tables, path)
+            if fault["loc"][-1] == "id" and len(fault["loc"]) > len(path) + 2:
+                rest.undecidable.add("input")  # the header of the next widget may be missing below it
             continue
         match fault["loc"]:
             case ("interfaces" | "distro", *_):
