@@ -242,9 +242,13 @@ NAMES: Final = re.compile(r"\(((?:'[^']*'(?:, |,)?)+)\)")
 HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
 FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
-    "log", "control", "record", "demo", "robot", "source", "interlock", "alarm", "alarms", "place",
-    "diagnostics", "page", "group", "frame", "brand", "state", "detail", "oee", "reason", "counter",
-    "widget", "qos", "confirm", "options", "states", "zone", "zone_file",
+    "access", "alarm", "alarms", "brand", "column", "condition", "confirm", "control", "counter",
+    "current", "demo", "detail", "diagnostics", "embed", "font", "frame", "group", "help",
+    "interlock", "joint", "lamp", "layer", "level", "line", "list", "log", "mqtt", "oee", "oidc",
+    "options", "overview", "page", "pen", "place", "plan", "pose", "qos", "readback", "reason",
+    "recipe", "record", "recovery", "reported", "robot", "robot_level", "routes", "screen",
+    "setpoint", "site", "sort", "source", "state", "states", "steps", "target", "texts", "twist",
+    "when", "while", "widget", "x_axis", "y_axis", "zone", "zone_file",
     *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8
