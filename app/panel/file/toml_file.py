@@ -248,7 +248,7 @@ TABLES: Final = (
     "options", "overview", "page", "pen", "place", "plan", "pose", "qos", "readback", "reason",
     "recipe", "record", "recovery", "reported", "robot", "robot_level", "routes", "screen",
     "setpoint", "site", "sort", "source", "state", "states", "steps", "target", "texts", "twist",
-    "when", "while", "widget", "x_axis", "y_axis", "zone", "zone_file",
+    "value", "when", "while", "widget", "x_axis", "y_axis", "zone", "zone_file",
     *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8
