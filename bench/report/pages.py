@@ -23,7 +23,7 @@ README_PEERS: Final[Mapping[str, tuple[str, str]]] = {
     "zenoh-ts": ("zenoh-ts + Rust router", "no server to write"),
 }
 NOT_MEASURED: Final[Mapping[str, str]] = {
-    "Foxglove, Lichtblick": "3-D, maps, plots of anything",
+    "Foxglove, Lichtblick": "3-D, street maps, plots of anything",
     "FUXA": "13 languages, PLC protocols",
     "hand-made Qt or Tauri screen": "full control of the design, no browser",
 }
