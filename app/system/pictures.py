@@ -5,11 +5,12 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Final
-
-from markupsafe import Markup
+from typing import TYPE_CHECKING, Final
 
 from app.system.settings import shipped_path
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 SYMBOL: Final = re.compile(r'^<symbol id="([a-z0-9-]+)">(.+)</symbol>$', re.MULTILINE)
 PICTURE: Final = r"^[A-Za-z0-9_-]+\.(svg|png|jpg|jpeg|webp)$"
@@ -24,9 +25,11 @@ def icons() -> Mapping[str, str]:
 
 
 @cache
-def icon(name: str) -> Markup:
+def icon(name: str) -> "Markup":
     """An icon as an element. It says nothing that the text beside it does not. KeyError for an unknown
     one."""
+    from markupsafe import Markup  # who installs the panel has no packages yet
+
     inside = Markup(icons()[name])
     return Markup('<svg class="icon" viewBox="0 0 24 24" aria-hidden="true">{}</svg>').format(inside)
 
