@@ -135,7 +135,7 @@ def is_permitted(server: Server) -> bool:
 def test_one_robot_on_two_panels_at_two_routers(
     domain: int, routers: LinkedRouters, stack: ExitStack, tmp_path: Path
 ) -> None:
-    robot = Robot(stack, domain + 9, routers.endpoints)
+    robot = Robot(stack, domain + 2, routers.endpoints)
     first, second = (
         panel(stack, tmp_path / f"panel{number}", [endpoint])
         for number, endpoint in enumerate(routers.endpoints)
@@ -176,7 +176,7 @@ def test_robots_of_one_panel_at_several_routers(domain: int, stack: ExitStack, t
         place.start()
         stack.callback(place.end)
     ends = [place.endpoint for place in places]
-    robots = [Robot(stack, domain + 10 + at, [end], f"/robot{at + 1}") for at, end in enumerate(ends)]
+    robots = [Robot(stack, domain + 3 + at, [end], f"/robot{at + 1}") for at, end in enumerate(ends)]
     tables = "".join(ROBOT.format(number=at, endpoint=end) for at, end in enumerate(ends, 1))
     server = panel(stack, tmp_path, ends, tables)
     _each_robot_is_its_own(server, robots)
@@ -197,7 +197,7 @@ def test_namespaces_pass_between_routers(
     """Both robots are reached at the second router; the first robot's bridge is at the first."""
     here = routers.endpoints[1]
     robots = [
-        Robot(stack, domain + 12 + at, [end], f"/robot{at + 1}")
+        Robot(stack, domain + 5 + at, [end], f"/robot{at + 1}")
         for at, end in enumerate(routers.endpoints)
     ]
     tables = "".join(ROBOT.format(number=number, endpoint=here) for number in (1, 2))

@@ -9,7 +9,8 @@ from functools import cache
 from itertools import cycle, islice
 from typing import Final
 
-EACH: Final = 11  # per process
+EACH: Final = 11  # per process: those of the tests, then two of the Cyclone DDS robot
+OWN: Final = EACH - 2
 # ROS 2's domains 0 to 101 work on every system, on Linux 215 to 232 as well.
 FIRSTS: Final = (*range(1, 91, EACH), 215)
 LOCK: Final = "\0operator-panel-tests-{}"  # an abstract socket name: released with the process
@@ -35,9 +36,20 @@ def _place() -> int:
     raise RuntimeError(f"{len(FIRSTS)} workers of tests run already on this machine")
 
 
-def first() -> int:
-    """The first of `EACH` domains of this process."""
-    return int(FIRSTS[_place()])
+class Domain(int):
+    """A domain of this process. A sum that is none of the tests' domains here is refused: another
+    process or the Cyclone DDS robot has it, and each would hear the other's nodes."""
+
+    def __add__(self, more: int) -> "Domain":
+        begin, number = FIRSTS[_place()], int(self) + more
+        if not begin <= number < begin + OWN:
+            raise ValueError(f"domain {number}: the tests of this process have {OWN} from {begin} on")
+        return Domain(number)
+
+
+def first() -> Domain:
+    """The first of `OWN` domains of this process."""
+    return Domain(FIRSTS[_place()])
 
 
 @cache
@@ -53,4 +65,5 @@ def ports() -> Iterator[int]:
 
 def cyclone() -> tuple[int, int]:
     """The domains of the Cyclone DDS robot."""
-    return first() + 9, first() + 10
+    begin = FIRSTS[_place()] + OWN
+    return begin, begin + 1

@@ -31,7 +31,7 @@ def test_a_peer_of_two_routers_is_found_and_no_client(
     mode: str,
     expected: list[str],
 ) -> None:
-    robot = Robot(stack, domain + 14, routers.endpoints)
+    robot = Robot(stack, domain + 6, routers.endpoints)
     robot.node.every("/heard", {"data": "again"}, 0.1)
     file = tmp_path / "cell.toml"
     file.write_text(PANEL.replace("{robots}", ""))
