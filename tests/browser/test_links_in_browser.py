@@ -160,6 +160,10 @@ def test_the_links_open_under_a_finger_and_move_nothing(
     page = context.new_page()
     page.goto(server.url)
     expect(page.locator("#links")).to_be_hidden()
+    if scripts:
+        page.evaluate("document.fonts.ready")
+    else:
+        page.wait_for_load_state("networkidle")
     lamps = place(page.locator(".lamps"))
     assert lamps["height"] >= 44
     assert lamps["width"] * 0.22 >= 20
