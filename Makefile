@@ -1,5 +1,5 @@
 # make run   the panel with a simulated robot, at http://127.0.0.1:8000; PANEL=mobile-robot make run: a robot that drives
-# make test  all that needs no Rust and no ROS, with a real browser: 12 minutes on a bare machine
+# make test  all that needs no Rust and no ROS, with a real browser: 13 minutes on a bare machine
 # make test-robot  on the real bridge, real ROS 2 nodes, brokers, proxies and other browsers
 # make test-long  real time, floods, faults, every screen, packaging: an hour; writes docs/test-report.md
 # make check  types and style

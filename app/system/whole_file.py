@@ -14,7 +14,7 @@ from typing import BinaryIO, Final, TypedDict, Unpack
 
 SUFFIX: Final = ".new"  # of a file that is being written, or was left by a process that was killed
 PRIVATE: Final = 0o600
-LEFT_AFTER_S: Final = 600.0  # nobody is writing such a file any more
+LEFT_AFTER_S: Final = 600.0  # no process is writing such a file any more
 NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 

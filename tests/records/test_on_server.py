@@ -346,9 +346,9 @@ def test_the_command_finds_the_servers_own_log(
         check=False,
     )
     assert done.returncode == 0
-    told = re.match(r"ok, (\d+) entries, head (\w+)\n", done.stdout)
-    assert told, done.stdout
-    count = int(told[1])  # with the start and its signature; later the clock's state is added too
+    line = re.match(r"ok, (\d+) entries, head (\w+)\n", done.stdout)
+    assert line, done.stdout
+    count = int(line[1])  # with the start and its signature; later the clock's state is added too
     assert count >= 202
-    assert verify(tmp_path, known_head=told[2]).fault == ""
+    assert verify(tmp_path, known_head=line[2]).fault == ""
     assert f"the {count - 2} entries after it are proven by the chain only" in done.stdout

@@ -60,8 +60,8 @@ def small(**about: Any) -> ShownView:
 
 
 def with_widget(shown: ShownView, **widgets: Any) -> ShownView:
-    view = {**shown.view, "widgets": {**shown.view["widgets"], **widgets}}
-    return replace(shown, view=view)  # type: ignore[arg-type]
+    view: Any = {**shown.view, "widgets": {**shown.view["widgets"], **widgets}}
+    return replace(shown, view=view)
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,10 @@ def test_a_wrong_signature_is_such_an_error(
     session: zenoh.Session, records: list[logging.LogRecord]
 ) -> None:
     """As that of a method that a test has replaced."""
-    replaced: Any = lambda: None  # noqa: E731
+
+    def without_event() -> None: ...
+
+    replaced: Any = without_event
     declared = session.declare_subscriber("callbacks/*", direct(replaced))
     session.put("callbacks/one", b"")
     until(lambda: callback_errors.count, "it has failed")
