@@ -102,11 +102,14 @@ function hasKept() {
 // The page starts. `keep` is called once there is something to keep, or to enter again.
 /** @param {() => void} keep */
 export function followEntries(keep) {
-  addEventListener("input", ({ target }) => {
+  /** @param {EventTarget | null} target */
+  const follow = (target) => {
     changed.add(target);
     if (target instanceof Element && target.matches("[data-entry]")) touched.add(target);
-  });
+  };
+  pageGuard.changed.forEach(follow); // while the modules were on their way
+  addEventListener("input", ({ target }) => follow(target));
   if (document.querySelector("[data-recipes]")) return; // these values are those of a recipe
-  if (hasKept()) keep();
+  if (hasKept() || changed.size) keep();
   else addEventListener("input", keep, { once: true });
 }

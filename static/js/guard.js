@@ -15,6 +15,7 @@
   /** @type {PageGuard} */
   var guard = (window.pageGuard = {
     page: page,
+    changed: [],
     isBroken: false,
     fail: fail,
     started: onStarted,
@@ -185,6 +186,10 @@
     }
   }
 
+  // What is entered before the modules are there is kept too.
+  addEventListener("input", function (event) {
+    if (!started) guard.changed.push(event.target);
+  });
   addEventListener("error", function (event) {
     if (!started && event.filename && event.filename.indexOf("/static/") > 0) fail(event.error);
   });

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.support.browser.pages import widget
 from tests.support.browser.touch import loaded
-from tests.support.parts import ROOT, Server
+from tests.support.parts import ROOT, Server, until
 from tests.support.servers import demo_server, ready
 
 PANEL: Final = """
@@ -159,6 +159,29 @@ def test_entry_is_kept_over_another_page_and_is_not_sent(kiosk: Server, page: Pa
     assert sent == []
     page.locator('[data-widget="send"] button[type=submit]').click()
     expect(page.locator("#receipt-send")).to_contain_text("Sent at")
+
+
+def test_entry_before_the_scripts_arrive_is_kept(kiosk: Server, page: Page) -> None:
+    """The robot's value is not put over it: the press would send that in its place."""
+    held: list[Route] = []
+    page.route("**/main.js", lambda route: held.append(route))
+    page.goto(kiosk.url + "/pages/one", wait_until="domcontentloaded")
+    page.locator("#input-height").fill("0.3")
+    for name, text in {"level": "1234.5", "note": "grüezi <b>"}.items():
+        page.locator(f"#input-{name}").fill(text)
+    page.locator("#input-mode").select_option("2")
+    page.locator("#input-light").check(force=True)
+    page.locator(GAIN).fill("4.5")
+    page.locator(GAINS).fill("1.5, 2")
+    until(lambda: bool(held), "the page's script is requested")
+    page.unroute("**/main.js")  # lets what is held go on
+    expect(page.locator("html[data-kept]")).to_be_attached()
+    for gain in (3, 2):  # one of them is another than before
+        kiosk.http.post("/widgets/gain", json={"inputs": {"gain": gain}})
+        expect(widget(page, "gain").locator(".value")).to_have_text(str(gain))
+    are_there(page)
+    gone_and_back(page)
+    are_there(page)
 
 
 @pytest.mark.long("detail")

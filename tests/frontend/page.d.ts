@@ -3,6 +3,7 @@
 // The script of the page itself, static/js/guard.js.
 interface PageGuard {
   page: PageData;
+  changed: (EventTarget | null)[]; // what was entered before the modules were there
   isBroken: boolean;
   fail(error?: unknown): void;
   started(): void;
