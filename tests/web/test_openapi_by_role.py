@@ -89,7 +89,7 @@ def test_no_role_does_more_than_it_may(users: Users, role: str, tmp_path: Path) 
         *([f"--header=Authorization: Bearer {token}"] if token else []),
     )
     assert "Traceback" not in users.server.process.text
-    rows = users.rows()[seen:]
+    rows = [row for row in users.rows()[seen:] if row["address"]]  # not those of clocks
     done_by_it = {(row["action"], row["widget"]) for row in rows if row["outcome"] != "refused"}
     assert done_by_it <= PERMITTED[role]
     assert any(row["outcome"] == "refused" for row in rows)
