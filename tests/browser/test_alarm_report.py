@@ -15,7 +15,7 @@ from tests.browser.test_alarm_history import written
 from tests.browser.test_alarm_line import SIZES, started
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN
-from tests.support.parts import Server, until
+from tests.support.parts import TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
 
@@ -130,6 +130,7 @@ def test_a_message_to_the_next_shift_is_on_the_report_and_in_the_log(
     page.goto(f"{cell.url}/alarms/report")
     assert page.locator(".bar-marks span").count() == page.locator(".paper .alarm-plot rect").count()
     page.locator("#message").fill("Hose of gripper 2 leaks <b>")
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Leave message").click()
     expect(page.locator(".paper .shift-message h3")).to_have_text("Message to the next shift")
     expect(page.locator(".paper .shift-message p")).to_have_text("Hose of gripper 2 leaks <b>")

@@ -12,7 +12,7 @@ from tests.browser.test_alarm_line import SIZES, started
 from tests.browser.test_alarm_widgets import AIR_LIST, WIDGETS
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, place
-from tests.support.parts import Server, until
+from tests.support.parts import TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server
 from tests.support.users import add_user
 from tests.web.test_alarms import LOW, PANEL, act, listed
@@ -20,7 +20,6 @@ from tests.web.test_alarms import LOW, PANEL, act, listed
 pytestmark = pytest.mark.long("detail")
 
 
-SECOND_TAP_MS: Final = 800  # sooner a form without scripts counts as a second tap
 WITH_LISTS: Final = PANEL.replace("[demo]\n", WIDGETS)
 SHEET: Final = "#alarm-sheet"
 
@@ -110,7 +109,7 @@ def test_without_scripts_the_row_leads_to_its_sheet(
     page.locator("li[data-alarm=air_low] .more-acts").first.click()
     sheet = page.locator(SHEET)
     expect(sheet).to_contain_text("Air pressure low")
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     sheet.get_by_role("button", name="Shelve", exact=True).click()
     row = page.locator(".alarm-list li[data-alarm=air_low]")
     expect(row).to_have_attribute("data-state", "shelved")

@@ -12,7 +12,7 @@ from tests.browser.test_alarm_line import CONTROL, SIZES, started
 from tests.support.browser.browsers import sized
 from tests.support.browser.finger import Touch
 from tests.support.browser.pages import DRAWN, HIDE, follow, middle, place
-from tests.support.parts import ENOUGH_S, Server, until
+from tests.support.parts import ENOUGH_S, TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import LOW, PANEL, act, listed
 
@@ -104,7 +104,7 @@ def test_a_tap_in_the_list_acknowledges_that_alarm_then_resets_it(
 def test_a_row_that_came_under_the_finger_is_not_acknowledged(cell: Server, touch_page: Page) -> None:
     page = started(touch_page, cell.url)
     touch = Touch(page)
-    expect(page.locator(f"{ALL_LIST} .row-act")).to_be_enabled()
+    expect(page.locator(f"{ALL_LIST} .row-act[data-path]")).to_be_enabled()  # of the first event
     with page.expect_response("**/acknowledge", timeout=1000 * ENOUGH_S) as answer:
         touch.send("touchStart", middle(page.locator(f"{ALL_LIST} .row-act")))
         act(cell, "air_latched", "acknowledge", occurrence=1)
@@ -120,7 +120,7 @@ def test_without_scripts_the_buttons_are_forms(cell: Server, chromium: Browser) 
         page = context.new_page()
         for widget, alarm in ((AIR_LIST, "air_low"), (HIGH_LINE, "air_latched")):
             page.goto(cell.url)
-            page.wait_for_timeout(800)  # sooner it counts as a second tap
+            page.wait_for_timeout(TAP_AGAIN_MS)  # sooner it counts as a second tap
             follow(page.locator(f"{widget} button:not(.more-acts)"))
             assert page.url.startswith(f"{cell.url}/pages/main")
             assert listed(cell)[alarm]["acknowledged"]

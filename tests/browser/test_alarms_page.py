@@ -13,13 +13,12 @@ from tests.browser.test_accessibility import violations
 from tests.browser.test_alarm_line import SIZES, started
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, follow
-from tests.support.parts import Server, until
+from tests.support.parts import TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server
 from tests.web.test_alarms import act, listed, server_with
 
 pytestmark = pytest.mark.long("detail")
 
-SECOND_TAP_MS: Final = 800  # a form that is sent sooner after the page is a second tap
 TABS: Final = """
 title = "Cell"
 [[page]]
@@ -126,7 +125,7 @@ def test_the_filter_works_without_scripts_and_follows_to_the_details(
 
 def test_acknowledge_all_shown_leaves_what_the_filter_hides(cell: Server, page: Page) -> None:
     started(page, f"{cell.url}/alarms?priority=2")
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.locator(".all-shown button").click()
     until(lambda: listed(cell)["air_low"]["acknowledged"], "it is acknowledged")
     assert not listed(cell)["air_latched"]["acknowledged"]
@@ -141,7 +140,7 @@ def test_an_alarm_of_its_own_is_acknowledged_and_shelved_from_its_details(
     expect(page.locator(".details h3").first).to_have_text("Air pressure low")
     page.locator(".acts [popovertarget=sheet-shelve]").last.click()
     page.locator(".sheet:popover-open select[name=reason]").select_option(index=1)
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.locator(".sheet:popover-open button[type=submit]").click()
     until(lambda: listed(cell)["air_low"]["state"] == "shelved", "it is shelved")
     assert listed(cell)["air_low"]["shelf"]["reason"] == "Repair is ordered"
@@ -240,7 +239,7 @@ def test_all_shown_are_those_at_the_touch(cell: Server, page: Page) -> None:
     act(cell, "air_low", "shelve", reason="Tests", for_s=60)
     started(page, f"{cell.url}/alarms")
     expect(page.locator("li.alarm[data-state=shelved]")).to_have_count(1)
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.locator(".all-shown button").hover()
     page.mouse.down()
     act(cell, "air_low", "unshelve")
@@ -259,6 +258,6 @@ def test_all_shown_have_the_occurrences_of_now_not_of_loading(cell: Server, page
     act(cell, "air_low", "unshelve")
     until(lambda: listed(cell)["air_low"]["occurrence"] == 2, "it was raised again")
     expect(page.locator("li.alarm[data-state=active]")).to_have_count(2)
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.locator(".all-shown button").click()
     until(lambda: listed(cell)["air_low"]["acknowledged"], "its second occurrence is acknowledged")

@@ -13,7 +13,7 @@ from tests.support.browser.browsers import ReusedPage, sized
 from tests.support.browser.pages import place
 from tests.support.browser.touch import settled
 from tests.support.confirmed import add_users
-from tests.support.parts import Server, until
+from tests.support.parts import TAP_AGAIN_MS, Server, until
 from tests.support.servers import demo_server
 from tests.support.users import Browsers
 from tests.web.test_recipes_confirmed import FAST, OTHER
@@ -21,7 +21,6 @@ from tests.web.test_recipes_confirmed import FAST, OTHER
 pytestmark = pytest.mark.long("detail")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
-SECOND_TAP_MS: Final = 800
 STOP: Final = """
 [[frame.widget]]
 id = "halt"
@@ -122,7 +121,7 @@ def test_a_name_is_typed_on_the_keyboard(screen: Page, cell: Server) -> None:
         page.locator(f'.sheet.keyboard [data-key="{key}"]').tap()
     page.locator(".sheet.keyboard .set-entry").tap()
     settled(page)
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Copy").tap()
     expect(page.locator(".recipe h2")).to_have_text("box")
 

@@ -12,14 +12,13 @@ from tests.browser.test_accessibility import violations
 from tests.cell.recipes.panels import CARTON, TRAY
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
-from tests.support.parts import Server
+from tests.support.parts import TAP_AGAIN_MS, Server
 from tests.web.test_recipes import act, exported, load, make, server_with
 
 pytestmark = [pytest.mark.long("detail"), pytest.mark.promise("recipes")]
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 LOAD: Final = "[data-widget=boxes] .load > button"
-SECOND_TAP_MS: Final = 800  # a form that is sent sooner after the page is a second tap
 # Texts and buttons that leave their place, by their classes and texts.
 CUT: Final = """() => [...document.querySelectorAll("main :is(.act, .act *, em, .face .label)")]
   .filter((e) => e.checkVisibility() && e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0)
@@ -69,7 +68,7 @@ def test_a_recipe_is_edited_by_keyboard_and_touch(cell: Server, page: Page) -> N
     page.get_by_role("link", name="Edit").click()
     page.locator("#input-length").fill("450")
     page.locator("#input-fast").evaluate("(box) => box.click()")
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Save").click()
     expect(page.locator("[data-row=length] .mine")).to_have_text("450 mm")
     row = exported(cell)["Tray"]
@@ -78,7 +77,7 @@ def test_a_recipe_is_edited_by_keyboard_and_touch(cell: Server, page: Page) -> N
     expect(page.locator("ol.versions li").first).to_contain_text(
         "Length 600 mm → 450 mm, Fast On → Off"
     )
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Restore").click()
     expect(page.locator("[data-row=length] .mine")).to_have_text("600 mm")
 
@@ -87,7 +86,7 @@ def test_an_edit_that_came_second_is_refused_with_who_was_first(cell: Server, pa
     started(page, f"{cell.url}/recipes/boxes?recipe=tray&mode=edit")
     act(cell, "save", recipe="tray", version=1, values={**TRAY, "note": "first"})
     page.locator("#input-note").fill("second")
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Save").click()
     expect(page.locator(".said")).to_contain_text("Tray was changed by")
     assert exported(cell)["Tray"]["note"] == "first"
@@ -96,19 +95,19 @@ def test_an_edit_that_came_second_is_refused_with_who_was_first(cell: Server, pa
 def test_recipes_are_made_named_and_deleted(cell: Server, page: Page) -> None:
     started(page, f"{cell.url}/recipes/boxes?mode=new")
     page.get_by_label("Name").fill("Bag 25 kg")
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Save").click()
     expect(page.locator(".recipe h2")).to_have_text("Bag 25 kg")
     for link, button, name in (("Copy", "Copy", "Sack"), ("Rename", "Rename", "Sack 2")):
         page.locator("[popovertarget=more]").click()
         page.locator("#more").get_by_role("link", name=link).click()
         page.get_by_label("Name").fill(name)
-        page.wait_for_timeout(SECOND_TAP_MS)
+        page.wait_for_timeout(TAP_AGAIN_MS)
         page.get_by_role("button", name=button).click()
         expect(page.locator(".recipe h2")).to_have_text(name)
     page.locator("[popovertarget=more]").click()
     page.locator("#more").get_by_role("link", name="Delete").click()
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Delete").click()
     expect(page.locator("ol.recipes li")).to_have_count(3)
     assert {*exported(cell)} == {"Carton 400 × 300", "Tray", "Bag 25 kg"}

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, Request, expect
 
 from tests.support.browser.pages import comes, middle, press_button, widget
 from tests.support.holds import PANEL
-from tests.support.parts import free_port, until
+from tests.support.parts import TAP_AGAIN_MS, free_port, until
 from tests.support.proxy import proxied
 from tests.support.servers import demo_server
 
@@ -153,7 +153,7 @@ def test_links_forms_and_cookies_stay_below_the_path(
 
 def test_a_form_is_pressed_below_the_path(without_scripts: Page, url: str) -> None:
     without_scripts.goto(f"{url}/pages/one")
-    without_scripts.wait_for_timeout(800)  # sooner it is a second tap
+    without_scripts.wait_for_timeout(TAP_AGAIN_MS)  # sooner it is a second tap
     without_scripts.get_by_role("button", name="Say").click()
     expect(without_scripts.locator("#receipt-say")).to_have_attribute("data-outcome", "published")
     assert without_scripts.url.startswith(f"{url}/pages/one?receipt=")

@@ -8,10 +8,10 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.test_accessibility import violations
 from tests.browser.test_sign_in import signed_in_by_pad
-from tests.browser.test_users_page import CUT, SECOND_TAP_MS, SIZES, SMALL
+from tests.browser.test_users_page import CUT, SIZES, SMALL
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import without_its_time
-from tests.support.parts import ROOT, Server
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server
 from tests.support.servers import ready
 from tests.support.users import add_user
 
@@ -50,7 +50,7 @@ def test_the_ended_browser_locks_and_says_who_ended_it(
         expect(engineer.locator(".people li")).to_have_count(2)
         engineer.locator(".people a", has_text="M. Sato").click()
         expect(engineer.locator("#user-title")).to_have_text("M. Sato")
-        engineer.wait_for_timeout(SECOND_TAP_MS)
+        engineer.wait_for_timeout(TAP_AGAIN_MS)
         engineer.locator(".account form button").click()
         expect(engineer.locator(".people li")).to_have_count(1)
         expect(engineer.locator(".said").first).to_contain_text("M. Sato is signed out")

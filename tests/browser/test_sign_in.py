@@ -137,6 +137,7 @@ def test_a_check_that_takes_long_says_that_it_goes_on(own_page: Page, kiosk: Ser
     page.goto(f"{kiosk.url}/signin?user=M.+Sato")
     for digit in "2580":
         page.locator(f".pad button[value='{digit}']").click()
+    expect(page.locator("input[name=pin]")).to_have_value("2580")
     page.locator(".sign-in-key").click()
     expect(page.locator("p.said")).to_have_text("Still checking. Please wait.")
     page.locator(".sign-in-key").click()

@@ -12,7 +12,7 @@ from app.web.language import COOKIE as LANGUAGE
 from tests.browser.test_accessibility import violations
 from tests.support.browser.browsers import sized
 from tests.support.browser.pages import DRAWN, settled
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.support.servers import ready
 from tests.support.users import add_user, token_of
 
@@ -20,7 +20,6 @@ pytestmark = pytest.mark.long("detail")
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 ENGINEER: Final = {"user": "J. Brandt", "password": "long enough"}
-SECOND_TAP_MS: Final = 800  # a form that is sent sooner after the page is a second tap
 SHOWN: Final = (
     "", "?name=M.+Sato", "?mode=add", "?name=M.+Sato&mode=role", "?name=M.+Sato&mode=pin",
     "?name=M.+Sato&mode=remove", "?tokens=true&name=line",
@@ -59,7 +58,7 @@ def users_page(page: Page, kiosk: Server, query: str = "") -> None:
 
 
 def save(page: Page) -> None:
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Save").click()
 
 
@@ -81,12 +80,12 @@ def test_an_engineer_adds_and_changes_a_user_by_finger(chromium: Browser, kiosk:
             expect(page.locator(".sheet")).to_have_count(0)
             expect(page.locator(place)).to_have_value(text)
         expect(page.locator("#entered")).to_have_attribute("type", "password")
-        page.wait_for_timeout(SECOND_TAP_MS)
+        page.wait_for_timeout(TAP_AGAIN_MS)
         page.get_by_text("Maintenance").tap()
         page.get_by_role("button", name="Save").tap()
         expect(page.locator(".said")).to_have_text('"kim" can sign in.')
         expect(page.locator("dd").first).to_have_text("Maintenance")
-        page.wait_for_timeout(SECOND_TAP_MS)
+        page.wait_for_timeout(TAP_AGAIN_MS)
         page.get_by_role("button", name="Disable").tap()
         expect(page.locator(".account .head p")).to_have_text("Disabled")
     kim = UsersFile(kiosk.data).read().user("kim")
@@ -99,7 +98,7 @@ def test_enter_saves_a_new_pin_and_does_not_remove_it(own_page: Page, kiosk: Ser
     signed_in(page, kiosk)
     users_page(page, kiosk, "?name=M.+Sato&mode=pin")
     page.locator("#entered").fill("9753")
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.keyboard.press("Enter")
     expect(page.locator(".said")).to_contain_text("The PIN of")
     sato = UsersFile(kiosk.data).read().user("M. Sato")
@@ -118,7 +117,7 @@ def test_a_page_without_scripts_makes_and_revokes_a_token(without_scripts: Page,
     assert "opt_" not in page.url
     page.get_by_role("link", name="Revoke").click()
     expect(page.locator("#made")).to_have_count(0)
-    page.wait_for_timeout(SECOND_TAP_MS)
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Revoke").click()
     expect(page.locator(".said")).to_contain_text("is revoked")
     names = {token.name for token in UsersFile(kiosk.data).read().tokens}

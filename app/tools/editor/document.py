@@ -370,7 +370,7 @@ class Document:
         value = _value(self.tables, path)
         if value is MISSING:
             raise EditError(say("edit_no_place", place=place_of(path)), path)
-        return value_text(value)
+        return f"{key_text(str(path[-1]))} = {value_text(value)}"  # it is written with dots
 
     def references(self, path: Path) -> list[Path]:
         """The places that name the id of a table: each path is that of a text."""

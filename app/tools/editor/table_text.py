@@ -73,11 +73,17 @@ def move_value(body: str, path: Path, index: int) -> str:
 
 
 def replace_value(body: str, path: Path, text: str) -> str:
-    """With another text of a key with its value, or of an element."""
+    """With another text of a key with its value, or of an element. What is written with dots is in no
+    one place: its keys get the values of the text."""
     span = layout_of(body).spans.get(path)
-    if span is None:
-        raise NoPlace(path)
-    return body[: span.start] + text + body[span.end :]
+    if span is not None:
+        return body[: span.start] + text + body[span.end :]
+    values = tomlrt.loads(text).to_dict()
+    if path[-1] not in values:
+        body = delete_value(body, path)
+    for key, value in values.items():
+        body = set_value(body, (*path[:-1], key), value)
+    return body
 
 
 def is_same(first: Any, second: Any) -> bool:

@@ -29,6 +29,7 @@ from app.web.requests import (
     JSON,
     PAGE,
     Described,
+    ErrorAnswer,
     FormFields,
     act_body_of,
     as_model,
@@ -110,9 +111,12 @@ class SignInRefused(BaseModel):
 
 
 REFUSED: Final[Described] = {
-    401: {"model": SignInRefused, "description": "the name, PIN, password or badge is wrong"},
+    401: {
+        "model": SignInRefused | ErrorAnswer,
+        "description": "the name, PIN, password or badge is wrong, or a program's token",
+    },
     429: {
-        "model": SignInRefused,
+        "model": SignInRefused | ErrorAnswer,
         "description": "after failures, or while others sign in; `Retry-After` says when to try again",
     },
 }

@@ -68,16 +68,23 @@ class Shell:
         return ["nsenter", f"--net=/proc/{self._holder.pid}/ns/net", "sh", "-c", command]
 
     def run(self, command: str) -> subprocess.CompletedProcess[str]:
-        """To its end; stdout has stderr too."""
-        return subprocess.run(
+        """To its end; stdout has stderr too. A test that is stopped leaves none of its processes."""
+        process = subprocess.Popen(
             self._command(command),
             cwd=self.checkout,
             env={**os.environ, **self._env},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            check=False,
+            start_new_session=True,
         )
+        try:
+            stdout, _ = process.communicate()
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            raise
+        return subprocess.CompletedProcess(process.args, process.returncode, stdout)
 
     def start(self, command: str, ready: str) -> Process:
         """Until it has printed `ready`."""

@@ -276,6 +276,14 @@ def assert_in_order(tables: Any, expected: Any) -> None:
             ReplaceText((*START, "message"), 'message = { data = "x" }'),
             ['-message = { data = "{speed} {{x}}", list = [1, 2] }', '+message = { data = "x" }'],
         ),
+        (
+            ReplaceText(("interlock", 0, "help"), 'help.text = { en = "Shut it" }'),
+            ['-help.text.en = "Close it"', '-help.text.de = "Schließen"', '+help.text.en = "Shut it"'],
+        ),
+        (
+            ReplaceText(("interlock", 0, "help"), ""),
+            ['-help.text.en = "Close it"', '-help.text.de = "Schließen"'],
+        ),
     ],
 )
 def test_an_edit_changes_its_own_lines(edit: Edit, lines: list[str]) -> None:
@@ -339,6 +347,8 @@ def test_a_copy_has_new_ids_and_its_references_name_them() -> None:
         (ReplaceText(("page", 0), ""), "edit_other_table"),
         (ReplaceText((*START, "message"), "message = "), "edit_not_toml"),
         (ReplaceText((*START, "message"), "a = 1\nmessage = {}"), "edit_other_key"),
+        (ReplaceText(("interlock", 0, "help"), "help = "), "edit_not_toml"),
+        (ReplaceText(("interlock", 0, "help"), "a = 1\nhelp.text = {}"), "edit_other_key"),
     ],
 )  # fmt: skip
 def test_what_can_not_be_done_is_refused_and_changes_nothing(edit: Edit, code: str) -> None:
@@ -425,6 +435,11 @@ def test_lines_and_texts() -> None:
     assert document.text_of(START).endswith("[page.widget.qos]\ndepth = 5\n")
     assert document.text_of((*START, "interlock")) == 'interlock = ["ready"]'
     assert document.text_of((*START, "states", 0)) == '{ value = 1, text = "One" }'
+    assert document.text_of(("interlock", 0, "help", "text", "en")) == 'help.text.en = "Close it"'
+    assert (
+        document.text_of(("interlock", 0, "help", "text"))
+        == 'text = { en = "Close it", de = "Schließen" }'
+    )
     assert document.text_of(()) == SMALL
     with pytest.raises(EditError):
         document.text_of(("page", 5))
@@ -587,7 +602,7 @@ def scopes(before: Document, edit: Edit) -> tuple[list[Path], list[Path]]:
     if isinstance(edit, Move):
         to = scope(before, edit.to)
         around += [to] if to != edit.to else []
-        return [path, *around], [edit.to, *around]
+        return [path, *around], [edit.to, *(after(edit, table) for table in around)]
     if around:
         return around, around
     if parent and header(before, parent) and header(before, parent) != keys_of(parent):
@@ -598,6 +613,16 @@ def scopes(before: Document, edit: Edit) -> tuple[list[Path], list[Path]]:
         case Insert():
             return [], [path]
     return [path], [path]
+
+
+def after(move: Move, path: Path) -> Path:
+    """Where a table is that is not moved itself."""
+    for (*around, at), by in ((move.path, -1), (move.to, 1)):
+        n = len(around)
+        step = path[n] if path[:n] == tuple(around) and n < len(path) else None
+        if isinstance(step, int) and isinstance(at, int) and step >= at:
+            path = (*around, step + by, *path[n + 1 :])
+    return path
 
 
 def keys_of(path: Path) -> Path:
