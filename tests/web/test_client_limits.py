@@ -39,6 +39,7 @@ READ_QUOTA: Final = RATE_LIMITS["reads"].quota
 KIOSK: Final = "127.0.0.1"
 OTHER: Final = "127.0.0.2"
 ANOTHER: Final = "127.0.0.3"
+SILENT: Final = "127.0.0.5"  # no test before has taken what it may ask for
 ATTACK_S: Final = 3.0
 CONNECTIONS: Final = 100
 # As many widgets as a large page has, and a camera.
@@ -224,7 +225,7 @@ def refused(socket: ClientConnection) -> bool:
 
 @pytest.mark.long("real time")
 def test_silent_viewers_leave_places_for_the_kiosk_and_for_others(cell: Server) -> None:
-    with a_hold_that_lasts(cell), looking(cell, OTHER, 40) as silent:
+    with a_hold_that_lasts(cell), looking(cell, SILENT, 40) as silent:
         assert len(silent) == VIEWERS.client
         with looking(cell, ANOTHER, 40) as more, looking(cell, "127.0.0.4", 40) as most:
             assert len(silent) + len(more) + len(most) == VIEWERS.others
@@ -232,7 +233,7 @@ def test_silent_viewers_leave_places_for_the_kiosk_and_for_others(cell: Server) 
                 assert len(own) == 1
                 own[0].send('{"next": true}')
                 assert json.loads(own[0].recv(ENOUGH_S))["number"] >= 1
-            with client(cell, OTHER) as program:
+            with client(cell, SILENT) as program:
                 answer = program.get("/widgets/view/frame")
                 assert (answer.status_code, answer.headers["retry-after"]) == (429, "5")
         with looking(cell, ANOTHER, 1) as own:
@@ -241,7 +242,7 @@ def test_silent_viewers_leave_places_for_the_kiosk_and_for_others(cell: Server) 
 
 @pytest.mark.long("detail")
 def test_a_viewer_that_asks_for_nothing_is_closed(cell: Server) -> None:
-    with looking(cell, OTHER, 1) as silent:
+    with looking(cell, SILENT, 1) as silent:
         with pytest.raises(ConnectionClosed):
             silent[0].recv(ENOUGH_S)
         assert silent[0].close_code == 4408
