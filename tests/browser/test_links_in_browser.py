@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from app.web.pages.display_choice import FONTS
 from tests.support.browser.pages import place
 from tests.support.parts import ENOUGH_S, REFERENCE, Bridge, RosNode, Server, live, until
 from tests.support.servers import ready
@@ -157,6 +158,7 @@ def test_the_links_open_under_a_finger_and_move_nothing(
     context = chromium.new_context(
         java_script_enabled=scripts, viewport={"width": width, "height": height}
     )
+    context.add_cookies([{"name": FONTS[0], "value": FONTS[1], "url": server.url}])
     page = context.new_page()
     page.goto(server.url)
     expect(page.locator("#links")).to_be_hidden()
