@@ -184,7 +184,14 @@ def test_a_part_fills_the_empty_cell_that_was_selected(desk: Page, running: Edit
     ).raise_for_status()
     expect(preview(desk).locator("#at-beside")).to_be_visible()
     over, beside = box_of(desk, "#at-over"), box_of(desk, "#at-beside")
-    desk.mouse.click(middle(over)[0], middle(beside)[1])
+
+    def is_chosen() -> bool:
+        """Before the editor knows of the edit, the empty place there is two rows high."""
+        desk.mouse.click(middle(over)[0], middle(beside)[1])
+        ring = desk.locator(".ring.chosen").bounding_box()
+        return ring is not None and ring["height"] == pytest.approx(beside["height"], abs=8)
+
+    wait(desk, is_chosen, "the empty cell is selected")
     expect(desk.locator(".ring.chosen .tag")).to_have_text("Empty place")
     item(desk, "parts", "Text").press("Enter")
     wait(desk, lambda: len(belt(running)) == 5, "the text is added")
